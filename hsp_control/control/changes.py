@@ -220,6 +220,12 @@ class TimeLine:
         """The setup with all changes."""
         return _applied(self.open, self.settled)
 
+    def begun(self, t: float) -> Setup:
+        """Return the setup with the changes that have begun at a time [s]."""
+        begun = [each for each in self.open if each.at <= t]
+        everything = len(begun) == len(self.open)
+        return self.setup if everything else _applied(begun, self.settled)
+
     def with_change(self, change: Change, here: Start | None) -> "TimeLine":
         """Return the time line with one more change."""
         earlier = [each for each in self.open if each.at <= change.at]

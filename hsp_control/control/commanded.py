@@ -1,6 +1,7 @@
 """Commands of a running controller: changes, targets and velocities."""
 
 from abc import abstractmethod
+from contextlib import suppress
 from dataclasses import replace
 from typing import Any
 
@@ -76,9 +77,10 @@ class Commanded(Composition):
         """Return the handle of a stream: ``controller.stream("hand").send(pose)``.
 
         Args:
-            of: The name of a task: the stream is the one that it follows once all
-                changes are over. Or a stream that was given to the controller, for an
-                obstacle, for example, or for the position of a pose.
+            of: The name of a task: the stream is the one that it follows after the
+                changes that have begun, or else after all of them. Or a stream that was
+                given to the controller, for an obstacle, for example, or for the
+                position of a pose.
 
         Raises:
             ControllerError: If there is no such task, or it follows no stream, or
@@ -100,9 +102,13 @@ class Commanded(Composition):
                 f"nothing of this controller follows this {type(of).__name__}: give it "
                 "to a task, or to controller.at(t)"
             )
-        followed = settled(self._followed(of).followed, np.inf)
+        followed: object = settled(self._followed(of).followed, np.inf)
         if isinstance(followed, FollowedStream):
             return followed.run
+        with suppress(ControllerError):  # it may be there no more
+            at_last: object = settled(self._followed(of, at_last=True).followed, np.inf)
+            if isinstance(at_last, FollowedStream):
+                return at_last.run
         raise ControllerError(
             f"task {of!r} follows no stream, but {type(followed).__name__}; give it "
             "one, such as StreamPose(), or set_target"
@@ -153,9 +159,9 @@ class Commanded(Composition):
                 self._rehearse(1)
         return stream
 
-    def _followed(self, task: str) -> Task:
-        """Return a task that follows a trajectory."""
-        present = self.setup.task(task).task
+    def _followed(self, task: str, *, at_last: bool = False) -> Task:
+        """Return a task that follows a trajectory; ``at_last``: after all changes."""
+        present = (self.setup.task(task) if at_last else self._task_now(task)).task
         if present.followed is None:
             raise ControllerError(f"task {task!r} follows no trajectory")
         return present

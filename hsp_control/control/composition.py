@@ -229,12 +229,32 @@ class Composition:
         return self._memory.streams
 
     def feedback(self, task: str) -> Feedback:
-        """Return a task's gains and offset in force; compensators write the offset.
+        """Return the gains in force of a task, and the offset by compensators.
 
         Raises:
             ControllerError: If there is no such task.
         """
-        return self._in_force.gains.feedback[self.setup.task(task).key].feedback
+        return self._in_force.gains.feedback[self._task_now(task).key].feedback
+
+    def _task_now(self, name: str) -> PlannedTask:
+        """Return the task of a name after the changes that have begun, or a later one.
+
+        Raises:
+            ControllerError: If there is no such task, now or later.
+        """
+        now = self._in_force.time_line.begun(max(self._in_force.latest, 0.0))
+        try:
+            return now.task(name)
+        except ControllerError:
+            return self.setup.task(name)
+
+    def offset(self, key: int) -> Array:
+        """Return the addition by compensators, who write it, to Kp e of a task, (m,).
+
+        Args:
+            key: That of the task; see `planned_levels`.
+        """
+        return self._in_force.gains.feedback[key].feedback.offset
 
     def _linear_feedback(self, task: str, state: RobotState) -> dict[float, Feedback]:
         """Return a task's feedback for small errors, by the time when it begins [s]."""
@@ -269,7 +289,7 @@ class Composition:
         Raises:
             ControllerError: If there is no such task.
         """
-        return self.setup.task(task).weight(t)
+        return self.setup.present_task(task, t).weight(t)
 
     def contact_weight(self, contact: str, t: float) -> float:
         """Return how active a contact is at time t [s], in [0, 1].

@@ -102,7 +102,7 @@ class RobotModel(Structure):
         wrist has to react to a push as quickly as a shoulder. For robots on legs the
         factor is 500.
         """
-        effort = self._largest_effort()
+        effort = self.largest_efforts()
         rate = np.full(self.nv, np.inf)
         for unit in set(self.units):
             alike = np.isfinite(effort) & (np.array(self.units) == unit)
@@ -127,7 +127,7 @@ class RobotModel(Structure):
         a maximum effort it accelerates the robot's mass as gains of 100 1/s² do at
         0.3 of its size.
         """
-        effort, lever = self._largest_effort(), 0.5 * self.size
+        effort, lever = self.largest_efforts(), 0.5 * self.size
         turns = np.array(self.units) == "rad"
         slides = effort[~turns & np.isfinite(effort)]
         turns = effort[turns & np.isfinite(effort)]
@@ -138,8 +138,11 @@ class RobotModel(Structure):
         moves = 30.0 * pin.computeTotalMass(self.model) * self.size
         return moves or np.inf, 0.5 * moves * lever or np.inf
 
-    def _largest_effort(self) -> Array:
-        """Return the motors' largest efforts, shape (nv,); inf for none."""
+    def largest_efforts(self) -> Array:
+        """Return the motors' largest efforts, shape (nv,) [N·m or N]; inf for none.
+
+        A model has none where its limit is 0, or not even a single-precision number.
+        """
         effort = np.array(self.model.effortLimit)
         effort[(effort <= 0.0) | (effort >= np.finfo(np.float32).max)] = np.inf
         effort[list(self.unactuated)] = np.inf

@@ -17,6 +17,7 @@ from hsp_control.control.active_stack import ActiveStack, StackedTask
 from hsp_control.control.controller import Controller
 from hsp_control.control.measurement import LogChannel
 from hsp_control.control.output import ControlOutput
+from hsp_control.control.task_names import TaskNames, task_meta
 from hsp_control.declaration.nested import parts_within
 from hsp_control.geometry.scene import Obstacle
 from hsp_control.law.problem import StepRecord
@@ -139,7 +140,7 @@ class TaskColumns:
         self.streamed: dict[str, list[Streamed]] = {}
         self._levels: dict[str, int] = {}
         self._streams: dict[str, list[tuple[str, StreamRun]]] = {}
-        self._names: dict[int, str] = {}  # in the log, of the tasks there are, by key
+        self._names = TaskNames()
         self._known: list[tuple[int, int]] = []
         # the active tasks: their places in the log, names, and springs
         self._active: list[tuple[str, str]] = []
@@ -154,28 +155,15 @@ class TaskColumns:
         if known == self._known:
             return
         self._known = known
-        there = {key for key, _ in known}
-        self._names = {key: name for key, name in self._names.items() if key in there}
+        names = self._names.update(each for level in levels for each in level)
         probe = _present_state(self._controller)
         for level, tasks in enumerate(levels):
             for each in tasks:
-                task = each.task
-                name = self._names.get(each.key) or self._log_name(task)
-                self._names[each.key] = name
+                task, name = each.task, names[each.key]
                 self.logged[name], self._levels[name] = task, level
                 runs = [each.run for each in parts_within(task, FollowedStream)]
                 self.streamed.setdefault(name, [run.declared for run in runs])
                 self._add(name, task, len(task.measure(probe.read_only)[0]))
-
-    def _log_name(self, task: Task) -> str:
-        """Return the name in the log of a new task."""
-        # It reuses the columns of a removed one, if they are the same.
-        name, k, taken = task.name, 2, {*self._names.values()}
-        while name in taken or (
-            name in self.logged and task_meta(self.logged[name]) != task_meta(task)
-        ):
-            name, k = f"{task.name}_{k}", k + 1
-        return name
 
     def _add(self, name: str, task: Task, width: int) -> None:
         """Add a task's columns; its reference has the given size."""
@@ -226,7 +214,7 @@ class TaskColumns:
         found: list[tuple[str, Array]] = []
         self._active, self._springs = [], []
         for each in active.stacked:
-            prefix = f"task.{self._names[each.planned.key]}"
+            prefix = f"task.{self._names.present[each.planned.key]}"
             found.append((f"{prefix}.error", law.task.error[each.rows]))
             found.append((f"{prefix}.error_rate", law.task.error_rate[each.rows]))
             self._active.append((prefix, each.name))
@@ -240,18 +228,6 @@ class TaskColumns:
             name: {**task_meta(task), "level": self._levels[name]}
             for name, task in self.logged.items()
         }
-
-
-def task_meta(task: Task) -> dict[str, Any]:
-    """Return the log's description of a task."""
-    return {
-        "type": type(task).__name__,
-        "rows": task.rows,
-        "error": [list(part) for part in task.error_parts],
-        "drawn": list(task.drawn),
-        "axes": getattr(task, "axes", None),
-        "frame": getattr(task, "frame", None),
-    }
 
 
 def _present_state(controller: Controller) -> RobotState:

@@ -127,5 +127,4 @@ def _what_forbids(controller: Controller) -> str:
 
 def largest_cancelled(robot: Robot) -> Array:
     """Return the largest effort that is cancelled, shape (nv,); inf: any."""
-    own = np.array(robot.model.effortLimit)
-    return np.where(own > 0.0, LARGEST_SHARE * own, np.inf)
+    return LARGEST_SHARE * robot.largest_efforts()

@@ -77,8 +77,11 @@ class CompensatedController:
         """Go on with the state of the copy's own controller."""
         vars(self).update(saved)
         self.state = self.controller.state
-        if self.compensation.predictor is None:
-            self._measured = self._run.measured = self.state
+        measured = self.state
+        if self.compensation.predictor is not None:  # with the controller's payloads
+            own = self._measured
+            measured = self.state.another().update(own.t, own.q, own.v)
+        self._measured = self._run.measured = measured
 
     def __copy__(self) -> "CompensatedController":
         """Return a copy that continues independently, of the same robot object."""

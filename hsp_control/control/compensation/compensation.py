@@ -187,7 +187,7 @@ STAGES: dict[str, Callable[[Any, Controller], Stage | None]] = {
     "start_up_ramp": lambda own, _: RunningRamp(own),
     "friction_feed_forward": lambda own, made: RunningFriction(own, made.robot),
     "momentum_observer": _begun_observer,
-    "predictor": lambda own, made: RunningPredictor(own, made.robot),
+    "predictor": lambda own, made: RunningPredictor(own, made),
     "force_feedback": RunningForceFeedback,
     "integral_action": RunningIntegral,
 }

@@ -1,6 +1,7 @@
 """Integral action: e'' + Kv e' + Kp e + Ki ∫e = 0."""
 
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import KW_ONLY, field
 from typing import Annotated
 
@@ -14,6 +15,8 @@ from hsp_control.control.actuation import Status
 from hsp_control.control.compensation.stage import Alone, AloneCalls, Run, Stage
 from hsp_control.control.controller import Controller
 from hsp_control.control.measurement import LogChannel
+from hsp_control.control.planned import PlannedTask
+from hsp_control.control.task_names import TaskNames
 from hsp_control.declaration import Part, within
 from hsp_control.declaration.quantities import (
     READ_ONLY,
@@ -68,70 +71,110 @@ class IntegralAction(Part, error=CompensationError):
                         f"there is no task {name!r}{did_you_mean(name, names)} "
                         f"(there are {listing(names)})"
                     )
-        gains = {}
-        for task in tasks:
-            if self.tasks is not None and task.name not in self.tasks:
-                continue
-            if impedance_of(task) is not None:
-                raise CompensationError(
-                    f"task {task.name!r} has an impedance: integral action would press "
-                    "against the external force; list the other tasks in tasks"
-                )
-            if task.name in self.ki:
-                with within("ki", task.name):
-                    Ki = as_matrix(as_gain(self.ki[task.name], "Ki"), task.rows, "Ki")
-            elif self.rate is not None:
-                Ki = self.rate * task.feedback().Kp
-            else:
-                continue
-            if task.order == 1:
-                raise CompensationError(
-                    f"task {task.name!r} has a first-order error equation; list the "
-                    "other tasks in tasks"
-                )
-            _check_decay(task, Ki)
-            gains[task.name] = Ki
-        return gains
+        gains = {task.name: self.gain(task) for task in tasks}
+        return {name: Ki for name, Ki in gains.items() if Ki is not None}
+
+    def gain(self, task: Task) -> Array | None:
+        """Return Ki of a task, shape (m, m); None: it has no integral action.
+
+        Raises:
+            CompensationError: If its error equation permits none.
+            GainError: If its error would not decay.
+        """
+        if self.tasks is not None and task.name not in self.tasks:
+            return None
+        if impedance_of(task) is not None:
+            raise CompensationError(
+                f"task {task.name!r} has an impedance: integral action would press "
+                "against the external force; list the other tasks in tasks"
+            )
+        if task.name in self.ki:
+            with within("ki", task.name):
+                Ki = as_matrix(as_gain(self.ki[task.name], "Ki"), task.rows, "Ki")
+        elif self.rate is not None:
+            Ki = self.rate * task.feedback().Kp
+        else:
+            return None
+        if task.order == 1:
+            raise CompensationError(
+                f"task {task.name!r} has a first-order error equation; list the "
+                "other tasks in tasks"
+            )
+        _check_decay(task, Ki)
+        return Ki
 
 
 class RunningIntegral(Stage):
-    """Integral action in one run: it keeps the integrals."""
+    """Integral action in one run: it keeps the integrals.
 
-    _bound: dict[str, tuple[Array, Callable[[], object]]] | None = None
+    By the keys of tasks, of which two may have one name while they fade. A task that a
+    change adds has integral action, too, where its error equation permits.
+
+    Attributes:
+        integrals: ∫e by task, shape (m,) [m·s or rad·s].
+    """
+
+    _bound: dict[int, tuple[Array, Callable[[], object]]] | None = None
 
     def __init__(self, declared: IntegralAction, controller: Controller) -> None:
-        self._controller = controller
+        self._declared, self._controller = declared, controller
         self._limit = np.inf if declared.limit is None else declared.limit
-        self._gains = declared.gains(controller.tasks)
-        # ∫e by task, shape (m,) [m·s or rad·s]
-        self.integrals: dict[str, Array] = {
-            name: np.zeros(len(Ki)) for name, Ki in self._gains.items()
-        }
+        self._gains: dict[int, Array | None] = {}
+        self.integrals: dict[int, Array] = {}
+        self._names = TaskNames()
+        declared.gains(controller.tasks)  # raises if one of these permits none
+        self._follow()
         self._period, self._hindered = np.zeros(1), np.zeros(1, dtype=np.int64)
+
+    def _follow(self) -> dict[int, PlannedTask]:
+        """Begin with the tasks that are new, forget those that are gone; return all."""
+        levels = self._controller.planned_levels
+        present = {each.key: each for level in levels for each in level}
+        if present.keys() == self._gains.keys():
+            return present
+        self._names.update(present.values())
+        before, self._gains = self._gains, {}
+        for key, each in present.items():
+            self._gains[key] = before.get(key)
+            if key not in before:
+                with suppress(CompensationError, GainError):
+                    self._gains[key] = self._declared.gain(each.task)
+        self.integrals = {
+            key: self.integrals.get(key, np.zeros(len(Ki)))
+            for key, Ki in self._gains.items()
+            if Ki is not None
+        }
+        bound = self._bound or {}
+        self._bound = {key: bound[key] for key in bound if key in self.integrals}
+        return present
 
     def finish(self, run: Run) -> None:
         """Integrate the errors of the fully active tasks; see `Stage.finish`."""
-        output, controller = run.output, self._controller
+        present, t = self._follow(), self._controller.state.t
+        output, active = run.output, self._controller.active_stack
         limited = output.status >= Status.LIMITED
-        errors: dict[str, Array | None] = {}
-        for name, rows in controller.task_rows.items():
-            if controller.weight_of(name, controller.state.t) >= 1.0:
-                errors[name] = output.task.error[rows]
+        errors = {
+            key: output.task.error[each.rows]
+            for each in active.stacked
+            if (key := each.planned.key) in present and present[key].weight(t) >= 1.0
+        }
         saturated = bool(output.damped) or limited or run.starting
         self.advance(errors, run.period, saturated)
 
     def alone(self, shared: Alone) -> AloneCalls:
         """Return the integrals; see `Stage.alone`."""
-        rows, errors = self._controller.task_rows, self._controller.active_stack.rows
+        stack = self._controller.active_stack
         given = shared.period, shared.damped, shared.status, shared.starting
         own = [
-            self._call(name, errors.error[rows[name]], *given) for name in self._gains
+            self._call(each.planned.key, stack.rows.error[each.rows], *given)
+            for each in stack.stacked
+            if each.planned.key in self.integrals
         ]
         return AloneCalls(finish=own)
 
     def _call(
         self,
-        name: str,
+        key: int,
         e: Array,
         period: Array,
         damped: Indices,
@@ -142,45 +185,45 @@ class RunningIntegral(Stage):
         return PartCall(
             engine.IntegrateError,
             e=e,
-            Ki=self._gains[name],
+            Ki=self._gains[key],
             limit=self._limit,
             period=period,
             damped=damped,
             status=status,
             starting=starting,
             limited=int(Status.LIMITED),
-            integral=self.integrals[name],
-            offset=self._controller.feedback(name).offset,
+            integral=self.integrals[key],
+            offset=self._controller.offset(key),
         )
 
     def log_channels(self, run: Run) -> Mapping[str, LogChannel]:
         """Return the integrals; see `Stage.log_channels`."""
+        names = self._names.present
         return {
-            f"task.{name}.integral": LogChannel(integral, "m·s or rad·s", "∫e")
-            for name, integral in self.integrals.items()
+            f"task.{names[key]}.integral": LogChannel(integral, "m·s or rad·s", "∫e")
+            for key, integral in self.integrals.items()
         }
 
     def advance(
-        self, errors: Mapping[str, Array | None], period: float, saturated: bool
+        self, errors: Mapping[int, Array], period: float, saturated: bool
     ) -> None:
-        """Integrate the errors over one period, for the next effort."""
+        """Integrate the errors, by task, over one period, for the next effort."""
         self._period[:], self._hindered[:] = period, saturated
-        for name in self._gains:
-            given = errors.get(name)
-            if given is not None:
-                e, integrate = self._integrating(name)
-                e[:] = given
+        for key in self.integrals:
+            if key in errors:
+                e, integrate = self._integrating(key)
+                e[:] = errors[key]
                 integrate()
 
-    def _integrating(self, name: str) -> tuple[Array, Callable[[], object]]:
+    def _integrating(self, key: int) -> tuple[Array, Callable[[], object]]:
         """Return the error that the call integrates, and the call."""
         if self._bound is None:
             self._bound = {}
-        if name not in self._bound:
-            e, never = np.zeros(len(self._gains[name])), np.zeros(1, dtype=np.int64)
-            call = self._call(name, e, self._period, never, never, self._hindered)
-            self._bound[name] = e, planned([call]).call()
-        return self._bound[name]
+        if key not in self._bound:
+            e, never = np.zeros(len(self.integrals[key])), np.zeros(1, dtype=np.int64)
+            call = self._call(key, e, self._period, never, never, self._hindered)
+            self._bound[key] = e, planned([call]).call()
+        return self._bound[key]
 
 
 def _check_decay(task: Task, Ki: Array) -> None:

@@ -30,6 +30,7 @@ from hsp_control.constraints.limits.joint_numbers import Positives, by_dof
 from hsp_control.control.active_stack import ActiveStack
 from hsp_control.control.compensation.stage import Alone, AloneCalls, Run, Stage
 from hsp_control.control.measurement import LogChannel
+from hsp_control.control.task_names import TaskNames
 from hsp_control.declaration import Part, within
 from hsp_control.declaration.quantities import Flag, Positive
 from hsp_control.engine.plans import PartCall
@@ -125,6 +126,7 @@ class RunningObserver(Stage):
         # p and Cᵀv - G at the last measurement, and whether there was one
         self._momentum, self._drift = np.zeros((2, len(clip)))
         self._begun = np.zeros(1, dtype=np.int64)
+        self._names = TaskNames()
 
     @property
     def disturbance(self) -> Array:
@@ -202,8 +204,7 @@ class RunningObserver(Stage):
         """Return r, and the force at every task of a frame that explains it."""
         r, meaning = self.disturbance, "estimated disturbance r"
         found = {"observer.disturbance": LogChannel(r, "N·m or N", meaning)}
-        limit = run.controller.robot.model.effortLimit
-        share = np.abs(r) / np.where(limit > 0.0, limit, np.inf)
+        share = np.abs(r) / run.controller.robot.largest_efforts()
         found["observer.share"] = LogChannel(
             np.array(share.max()),
             "-",
@@ -211,9 +212,12 @@ class RunningObserver(Stage):
             "describe the robot",
         )
         threshold = run.controller.singularity_threshold
-        for task in run.controller.tasks:
+        tasks = [each for level in run.controller.planned_levels for each in level]
+        names = self._names.update(tasks)
+        for each in tasks:
+            task = each.task
             if isinstance(task, CompliantTask) and task.wrench_unit is not None:
-                found[f"observer.wrench.{task.name}"] = LogChannel(
+                found[f"observer.wrench.{names[each.key]}"] = LogChannel(
                     task_wrench(task, run.measured, r, threshold),
                     task.wrench_unit,
                     "estimated force on the robot, in world axes",

@@ -9,9 +9,9 @@ import numpy as np
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import CompensationError
 from hsp_control.control.compensation.stage import Run, Stage
+from hsp_control.control.controller import Controller
 from hsp_control.declaration import Part
 from hsp_control.declaration.quantities import Count
-from hsp_control.robot import Robot
 from hsp_control.robot.integrators import Rk4
 from hsp_control.robot.kinematics import Term
 
@@ -44,10 +44,10 @@ class Predictor(Part, error=CompensationError):
 class RunningPredictor(Stage):
     """Integrates the model under the efforts that have not acted yet."""
 
-    def __init__(self, declared: Predictor, robot: Robot) -> None:
-        self._declared = declared
-        self._robot, self._period = robot, 0.0
-        self._tau = np.zeros(robot.nv)
+    def __init__(self, declared: Predictor, controller: Controller) -> None:
+        self._declared, self._controller = declared, controller
+        self._robot, self._period = controller.robot, 0.0
+        self._tau = np.zeros(controller.robot.nv)
 
     def __getstate__(self) -> dict[str, Any]:
         """Return a copy's state: its integrator begins anew, with its own memory."""
@@ -75,4 +75,6 @@ class RunningPredictor(Stage):
         return np.asarray(q), np.asarray(v)
 
     def _bind(self, q: Array, v: Array) -> Term:
-        return self._robot.bind_forward_dynamics(q, v, self._tau)
+        # Of the controller's model, with payloads and gravity as they are now.
+        dynamics = self._controller.state.dynamics
+        return self._robot.bind_forward_dynamics(q, v, self._tau, dynamics)

@@ -16,6 +16,7 @@ from hsp_control.control.compensation import (
     Compensation,
     MomentumObserver,
 )
+from hsp_control.control.compensation.automatic_observer import largest_cancelled
 from hsp_control.robot.integrators import Rk4
 from hsp_control.simulation.plants import (
     ImperfectPlant,
@@ -281,3 +282,13 @@ def test_a_circle_is_followed(name: str) -> None:
         late = log["task.hand.error"][log.t > 1.5]
         rms = np.sqrt(np.mean(np.sum(late**2, axis=1)))
         assert 1e3 * rms < 1.0
+
+
+def test_a_model_without_effort_limits_has_none_for_the_observer() -> None:
+    """Pinocchio's own limit is the largest number."""
+    model = PANDA.model.copy()
+    model.effortLimit[:] = np.finfo(float).max
+    model.effortLimit[3] = 80.0
+    found = largest_cancelled(hsp.Robot.from_pinocchio(model))
+    assert np.isinf(np.delete(found, 3)).all()
+    assert 0.0 < found[3] < 80.0

@@ -322,16 +322,16 @@ def test_an_integral_only_unwinds_while_the_law_is_not_delivered() -> None:
     action = RunningIntegral(IntegralAction(10.0, limit=8.0), made)
     offset = made.feedback("hand").offset
     e = np.array([1e-3, -1e-3, 0.0])
-    action.advance({"hand": e}, 0.5, saturated=False)
-    assert_allclose(action.integrals["hand"], 0.5 * e)
+    action.advance({0: e}, 0.5, saturated=False)
+    assert_allclose(action.integrals[0], 0.5 * e)
     assert_allclose(offset, 4000.0 * 0.5 * e)
-    action.advance({"hand": e}, 0.5, saturated=True)  # would grow: frozen
-    assert_allclose(action.integrals["hand"], 0.5 * e)
-    action.advance({"hand": -e}, 0.25, saturated=True)  # unwinds
-    assert_allclose(action.integrals["hand"], 0.25 * e)
-    action.advance({"hand": e}, 100.0, saturated=False)
+    action.advance({0: e}, 0.5, saturated=True)  # would grow: frozen
+    assert_allclose(action.integrals[0], 0.5 * e)
+    action.advance({0: -e}, 0.25, saturated=True)  # unwinds
+    assert_allclose(action.integrals[0], 0.25 * e)
+    action.advance({0: e}, 100.0, saturated=False)
     assert np.abs(offset).max() == pytest.approx(8.0)
-    action.advance({"hand": None}, 1.0, saturated=False)
+    action.advance({}, 1.0, saturated=False)
     assert np.abs(offset).max() == pytest.approx(8.0)
 
 

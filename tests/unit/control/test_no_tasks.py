@@ -63,3 +63,17 @@ def test_a_configuration_declares_it(
     forgotten.write_text("robot: {name: panda}\n")
     with pytest.raises(ConfigError, match=r"tasks: nothing given; .* write \{\} for n"):
         hsp.load_experiment(str(forgotten))
+
+
+def test_its_held_loop_is_checked_for_other_masses() -> None:
+    """The field alone: there is no error whose acceleration would be less."""
+    robot = hsp.Robot.load("panda")
+    controller = hsp.Controller(robot, [], hsp.TargetPosture(robot.home()))
+    model = robot.model.copy()
+    for inertia in list(model.inertias)[1:]:
+        inertia.mass *= 1.2
+    heavy = hsp.plants.RigidBodyPlant(hsp.Robot.from_pinocchio(model))
+    run = hsp.simulate(
+        controller, robot.home(), duration=0.05, control_period=1e-3, plant=heavy
+    )
+    assert run.status == "completed"

@@ -1,11 +1,19 @@
 """While a task fades into another one of the same name, their rows are distinct."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import hsp_control as hsp
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import ControllerError
+from hsp_control.control.compensation import (
+    CompensatedController,
+    Compensation,
+    IntegralAction,
+    MomentumObserver,
+)
 from hsp_control.tasks.impedance import parts_of
 
 H = 1e-3
@@ -92,3 +100,97 @@ def test_impedances_of_one_name_wait_by_themselves() -> None:
     placed = {each.name: each.in_force for each in made.active_stack.stacked}
     found = {name: parts_of(each.numbers).K[0, 0] for name, each in placed.items()}
     assert found == {"hand (old)": 800.0, "hand": 200.0}
+
+
+def log_of_exchange(compensation: Compensation, new: hsp.Task) -> hsp.Rollout:
+    """Return the log of a position that becomes another task of its name."""
+    made = hsp.Controller(ROBOT, [point(OLD)], limits=None)
+    made.at(0.05).ramp(0.1).remove("hand").add(new)
+    return hsp.simulate(
+        made,
+        ROBOT.home(),
+        duration=0.3,
+        control_period=H,
+        log_period=H,
+        check_rate=False,
+        compensation=compensation,
+    )
+
+
+@pytest.mark.parametrize("rows", [3, 6])
+def test_each_has_its_force_in_the_log(rows: int) -> None:
+    """Of as many rows or of others: an observer estimates both."""
+    new = point(NEW) if rows == 3 else hsp.FramePose("panda_tcp", name="hand")
+    log = log_of_exchange(Compensation(momentum_observer=MomentumObserver()), new)
+    old, after = log["observer.wrench.hand"], log["observer.wrench.hand_2"]
+    assert (old.shape[1], after.shape[1]) == (3, rows)
+    for column, begin, end in ((old, 0.0, 0.15), (after, 0.05, 0.3)):
+        there = np.isfinite(column).all(axis=1)
+        assert there[(log.t > begin + H) & (log.t < end - H)].all()
+
+
+def test_each_has_its_integral() -> None:
+    """A task that is removed takes its integral along; the new one begins with its own.
+
+    With integral action for all tasks, and for one by its name.
+    """
+    for tasks in (None, ["hand"]):
+        action = IntegralAction(2.0, tasks=tasks)
+        own = Compensation(momentum_observer=None, integral_action=action)
+        log = log_of_exchange(own, point(NEW))
+        old, new = log["task.hand.integral"], log["task.hand_2.integral"]
+        full = log.t >= 0.15 + H
+        error = log["task.hand_2.error"][full]
+        np.testing.assert_allclose(new[log.t < 0.15][-1], 0.0)
+        np.testing.assert_allclose(
+            new[full][-1], H * error.sum(axis=0), rtol=0.05, atol=1e-6
+        )
+        assert np.isnan(old[-1]).all()
+
+
+def test_a_task_is_integrated_where_another_one_is_removed() -> None:
+    made = hsp.Controller(
+        ROBOT,
+        [point(OLD), hsp.FrameOrientation("panda_tcp", name="turn")],
+        limits=None,
+    )
+    action = IntegralAction(2.0, tasks=["hand"])
+    own = Compensation(momentum_observer=None, integral_action=action)
+    compensated = CompensatedController(made, own)
+    compensated.effort(0.0, ROBOT.home(), REST, H)
+    made.at(0.0).ramp(0.05).remove("turn")
+    for k in range(1, 100):
+        compensated.effort(k * H, ROBOT.home(), REST, H)
+    e = compensated.output.error("hand")
+    channel = compensated.log_channels()["task.hand.integral"]
+    np.testing.assert_allclose(channel.value, 100 * H * e, rtol=1e-9)
+
+
+def now_and_later() -> hsp.Controller:
+    """Return a controller whose hand becomes another one, of other gains, at 10 s."""
+    later = replace(point(NEW), gains=hsp.Gains(natural_frequency=30.0))
+    made = hsp.Controller(ROBOT, [point(OLD)])
+    made.at(10.0).remove("hand").add(later)
+    made.compute(0.0, ROBOT.home(), REST)
+    return made
+
+
+def test_commands_go_to_the_task_that_is_there() -> None:
+    """Not to the one that takes its place later; nor are its numbers shown."""
+    made = now_and_later()
+    assert made.feedback("hand").Kp[0, 0] == 100.0
+    assert made.weight_of("hand", 0.0) == 1.0
+    made.set_target("hand", ROBOT.state(0.0, ROBOT.home(), REST).position("panda_tcp"))
+    for k in range(1, 1001):
+        output = made.compute(k * H, ROBOT.home(), REST)
+    np.testing.assert_allclose(output.error("hand"), 0.0, atol=1e-9)
+    made.compute(20.0, ROBOT.home(), REST)
+    assert made.feedback("hand").Kp[0, 0] == 900.0
+
+
+def test_a_task_that_will_be_removed_can_be_commanded() -> None:
+    made = hsp.Controller(ROBOT, [point(OLD)])
+    made.at(10.0).remove("hand")
+    made.compute(0.0, ROBOT.home(), REST)
+    made.set_velocity("hand", [0.0, 0.0, 0.1])
+    assert made.feedback("hand").Kp[0, 0] == 100.0
