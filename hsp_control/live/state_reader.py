@@ -200,7 +200,7 @@ class FrozenState:
         if self._same == 0:
             self._reckoning.correct(last.t, last.q, last.v)
         self._same += 1
-        self._reckoning.predict(applied + self.load)
+        self._reckoning.predict(applied)
         if self._same <= self._tolerated:
             return None
         reached = self._reckoning.state.q
