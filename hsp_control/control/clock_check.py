@@ -13,9 +13,9 @@ _STILL = 100
 """The same for steps at equal times: a loop may rehearse its first step."""
 _UNITS = 100.0
 """Times of a step over its period from which on they have different units."""
-_SECONDS = "seconds"
+_SECONDS, _SAME = "seconds", (0.1, 10.0)
 _RATIOS = {
-    _SECONDS: (0.1, 10.0),
+    _SECONDS: _SAME,
     "milliseconds": (1.0 / 3e3, 1.0 / 3e2),
     "microseconds": (1.0 / 3e6, 1.0 / 3e5),
     "nanoseconds": (1.0 / 3e9, 1.0 / 3e8),
@@ -123,14 +123,16 @@ class ClockCheck:
         if before is None:
             return
         passed = state.t - before[0]
-        self._backwards = self._backwards + 1 if passed < 0.0 else 0
+        way = 0.5 * passed * (before[2] + v)
+        difference = state.robot.difference(before[1], state.q)
+        ratio = way.dot(difference) / max(way.dot(way), 1e-300)
+        # The robot moves on while its clock runs back: no log that is read backwards.
+        opposed = passed < 0.0 and _SAME[0] < -ratio < _SAME[1]
+        self._backwards = self._backwards + 1 if opposed else 0
         if self._backwards >= _SURE and not self._told:
             self._tell(_MESSAGES["back"].format(t=state.t, passed=passed))
         if not passed > 0.0:
             return
-        way = 0.5 * passed * (before[2] + v)
-        difference = state.robot.difference(before[1], state.q)
-        ratio = way.dot(difference) / max(way.dot(way), 1e-300)
         shown = [unit for unit, (a, b) in _RATIOS.items() if a < ratio < b]
         unit = shown[0] if shown else ""
         self._alike = self._alike + 1 if unit == self._unit else 1
