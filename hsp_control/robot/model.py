@@ -114,9 +114,10 @@ class RobotModel(Structure):
         """The largest error of a task by default, of a position and an angle [m, rad].
 
         At ω0 = 10 rad/s the hand of an arm of 1 m then approaches at 1.75 m/s, about as
-        fast as its joints can.
+        fast as its joints can. A base that moves without an arm has no size: any
+        position.
         """
-        return 0.35 * self.size, 1.25
+        return 0.35 * self.size or np.inf, 1.25
 
     @cached_property
     def spring_force(self) -> tuple[float, float]:

@@ -272,3 +272,18 @@ def test_another_thread_waits() -> None:
     assert len(found) == 2
     (one,) = [each for each in found if not isinstance(each, np.ndarray)]
     assert_same(one, expected)
+
+
+def test_a_base_without_an_arm_is_driven(tmp_path: Path) -> None:
+    """It has no reach, from which bounds of errors would follow."""
+    urdf = tmp_path / "cart.urdf"
+    urdf.write_text(
+        '<robot name="cart"><link name="world"/><link name="cart"><inertial>'
+        '<mass value="10"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/>'
+        '</inertial></link><joint name="base" type="planar"><parent link="world"/>'
+        '<child link="cart"/><axis xyz="0 0 1"/></joint></robot>'
+    )
+    robot = hsp.Robot.load(urdf)
+    task = hsp.FramePosition("cart", hsp.Hold([1.0, 0.0]), axes="xy")
+    run = hsp.simulate(hsp.Controller(robot, [task]), robot.home(), duration=2.0)
+    assert np.abs(run["task.cart.error"][-1]).max() < 1e-6
