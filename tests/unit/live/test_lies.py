@@ -177,8 +177,9 @@ BEYOND = {
     ("xarm7", 0.002, "both: stuck, with +1"),
     ("xarm7", 0.01, "both: contrary"),
     ("ur5", 0.001, "both: contrary"),
+    ("ur5", 0.01, "velocity: drifting slowly"),  # by 6 %
 }
-"""Lies about both signals of a joint that exceed the bound: see docs/live.md."""
+"""Lies that exceed the bound, most about both signals of a joint: see docs/live.md."""
 
 
 @pytest.mark.parametrize(
@@ -428,7 +429,8 @@ def test_a_velocity_that_lags_from_the_first_state_on_is_no_lie(
         robot = Noisy(noise, 0.005, 20.0, 0.1, encoder, 3, period, wrong)
         settings = replace(SETTINGS, velocity_margin=1.0)
         report = run_loop(moving(arm), robot, duration=0.8, settings=settings)
-        assert report.ended == "completed", report.reason
+        # An arm of other masses may still move a little after so short a stop.
+        assert report.reason.startswith("the duration is over"), report.reason
 
 
 @pytest.mark.parametrize(
