@@ -35,6 +35,7 @@ import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import LogError
+from hsp_control.common.unicode_text import json_text
 
 MAGIC = b"hsp_control journal 1\n"
 KILLED = "the journal has no end: its writer was killed"
@@ -365,4 +366,4 @@ def joined(
 
 
 def _json(data: Any) -> bytes:
-    return json.dumps(data, ensure_ascii=False).encode()
+    return json_text(data).encode()

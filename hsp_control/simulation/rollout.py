@@ -16,6 +16,7 @@ import numpy as np
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import LogError
 from hsp_control.common.suggestions import did_you_mean, listing
+from hsp_control.common.unicode_text import json_text
 from hsp_control.declaration.language import spoken
 from hsp_control.robot import Robot, RobotState
 from hsp_control.robot.recorded import warn_of_another_robot
@@ -156,7 +157,7 @@ class Rollout:
         path = Path(path)
         part = path.with_name(f".{path.name}.part")
         arrays: dict[str, Any] = {
-            "meta": np.array(json.dumps(self.meta, ensure_ascii=False)), **self.columns
+            "meta": np.array(json_text(self.meta)), **self.columns
         }  # fmt: skip
         try:
             path.parent.mkdir(parents=True, exist_ok=True)

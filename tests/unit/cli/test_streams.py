@@ -56,6 +56,25 @@ def test_any_text_can_be_written(closed: tuple[int, ...], encoding: str) -> None
         assert done.stdout.strip() == expected.get(encoding, "\u00b5 \u2264".encode())
 
 
+@pytest.mark.process
+@pytest.mark.smoke
+def test_a_configuration_whose_name_is_not_utf8_is_run(tmp_path: Path) -> None:
+    name = b"caf\xe9.yaml".decode(errors="surrogateescape")
+    short = "robot: {name: planar3r}\ntasks: {}\nsimulation: {duration: 0.01}\n"
+    (tmp_path / name).write_text(short)
+    done = subprocess.run(
+        [sys.executable, "-m", "hsp_control", "run", name],
+        env={**os.environ, "PYTHONIOENCODING": "utf-8:strict"},
+        cwd=tmp_path,
+        capture_output=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr.decode()
+    assert done.stdout.decode().endswith("Log: out/caf\\udce9.npz\n")
+    log = Rollout.load(tmp_path / "out" / Path(name).with_suffix(".npz"))
+    assert name in str(log.meta)
+
+
 LONG = """
 import sys
 from hsp_control.cli.streams import lost_text, make_usable

@@ -391,6 +391,16 @@ def test_the_page_needs_nothing_from_anywhere(planar: Rollout, tmp_path: Path) -
     assert page.stat().st_size < 0.5 * MEGABYTE
 
 
+def test_runs_of_files_whose_names_are_not_utf8_are_compared(
+    planar: Rollout, tmp_path: Path
+) -> None:
+    name = b"caf\xe9".decode(errors="surrogateescape")
+    runs = [ComparedRun(n, robot_of(planar), planar) for n in (name, "b")]
+    page = export_html(runs, tmp_path / "page.html")
+    names = content_of(page)["runs"]["names"]
+    assert names == ["caf\\udce9", "b"]
+
+
 def logged(rollout: Rollout) -> ComparedRun:
     return ComparedRun("", robot_of(rollout), rollout)
 
