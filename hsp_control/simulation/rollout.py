@@ -21,6 +21,12 @@ from hsp_control.declaration.language import spoken
 from hsp_control.robot import Robot, RobotState
 from hsp_control.robot.recorded import warn_of_another_robot
 from hsp_control.simulation.journal import KILLED, JournalReader, is_journal
+from hsp_control.simulation.log_meta import (
+    WrongMetaError,
+    check_complete,
+    check_kinds,
+    check_robot,
+)
 from hsp_control.simulation.log_shapes import WrongColumnError, check_columns
 from hsp_control.simulation.run_summary import damped_rows, summary_text
 
@@ -194,8 +200,9 @@ class Rollout:
             reading = _read_journal if is_journal(path) else _read_npz
             columns, meta = reading(path)
             if meta.get("format") == FORMAT:
+                check_kinds(meta)
                 check_columns(columns, meta)
-        except WrongColumnError as error:
+        except (WrongColumnError, WrongMetaError) as error:
             raise LogError(f"{path}: {error}") from None
         except LogError:
             raise
@@ -219,6 +226,10 @@ class Rollout:
         for name in (*_REQUIRED, *meta.get("columns", ())):
             if name not in columns:
                 raise LogError(f"{path}: the log lacks the column {name!r}")
+        try:
+            check_complete(meta)
+        except WrongMetaError as error:
+            raise LogError(f"{path}: {error}") from None
         return cls(columns, meta)
 
 
@@ -231,6 +242,8 @@ def _read_journal(path: Path) -> tuple[dict[str, Array], dict[str, Any]]:
         why = "has no whole heading: it is damaged" if reader.damaged else why
         raise LogError(f"{path}: the journal {why}")
     columns, meta = reader.rows(0), reader.meta
+    check_kinds(meta)
+    check_robot(meta)
     check_columns(columns, meta)
     complete_columns(columns, meta["robot"]["continuous"])
     if not reader.ended:
