@@ -38,9 +38,9 @@ FORMAT = "hsp_control rollout 1"
 _REQUIRED = ("t", "q", "v", "tau")
 _UNREADABLE = (
     OSError, ValueError, EOFError, KeyError, NotImplementedError,
-    zipfile.BadZipFile, zlib.error, RecursionError, MemoryError, TypeError,
+    zipfile.BadZipFile, zlib.error, RuntimeError, MemoryError, TypeError,
 )  # fmt: skip
-"""The errors of a file that is truncated, damaged or something else."""
+"""The errors of a file that is truncated, damaged, something else or encrypted."""
 
 
 class Rollout:

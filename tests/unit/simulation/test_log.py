@@ -168,6 +168,19 @@ def test_a_log_with_a_wrong_byte_is_refused_or_whole(
     assert refused > 0.7 * len(places)
 
 
+def test_an_archive_marked_as_encrypted_is_refused(
+    short_log: tuple[Rollout, bytes, Path],
+) -> None:
+    """One bit of its directory says so."""
+    _, data, path = short_log
+    broken = bytearray(data)
+    end = broken.rfind(b"PK\x05\x06")
+    broken[int.from_bytes(broken[end + 16 : end + 20], "little") + 8] ^= 1
+    path.write_bytes(broken)
+    with pytest.raises(LogError, match=r"not a complete .npz log .*encrypted"):
+        Rollout.load(path)
+
+
 def npz(**arrays: Any) -> bytes:
     file = io.BytesIO()
     np.savez(file, **arrays)
