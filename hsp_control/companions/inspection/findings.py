@@ -22,6 +22,7 @@ from hsp_control.companions.inspection.reading import (
     check_followers,
     check_mesh_axes,
     check_planar_axes,
+    check_shapes,
     check_soft_limits,
     check_srdf,
     check_transmissions,
@@ -356,7 +357,7 @@ def inspect(description: RobotDescription, access: Access = ANYWHERE) -> Inspect
             findings += [*check_planar_axes(xml), *check_unread(xml)]
             findings += check_transmissions(xml)
             findings += [*check_meshes(xml, source), *check_mesh_axes(xml, source)]
-            findings += check_srdf(xml, source)
+            findings += [*check_shapes(xml), *check_srdf(xml, source)]
         errors = [f for f in findings if f.severity == "error"]
         if all(error.check == "inertia" for error in errors):
             if errors:

@@ -12,6 +12,7 @@ from hsp_control.robot.description.mesh_units import MeshUnits, mesh_units
 from hsp_control.robot.description.mimics import followers
 from hsp_control.robot.description.motor_inertia import transmissions
 from hsp_control.robot.description.sources import RobotSource
+from hsp_control.robot.description.urdf import why_no_shape
 
 _READ = {
     "robot": {"link", "joint", "material"},
@@ -155,6 +156,20 @@ def check_mesh_axes(xml: Element, source: RobotSource) -> Iterator[Finding]:
             "unlike in RViz",
             "if the robot looks wrong, write <up_axis>Z_UP",
         )
+
+
+def check_shapes(xml: Element) -> Iterator[Finding]:
+    """Yield the links with collision shapes that parsers refuse."""
+    for link in xml.findall("link"):
+        for element in link.findall("collision"):
+            if why := why_no_shape(element):
+                yield Finding(
+                    "warning",
+                    "shape",
+                    f"link {link.get('name', '')!r}",
+                    f"a collision shape: {why}",
+                    "distances leave out this shape: give the link another one",
+                )
 
 
 def check_srdf(xml: Element, source: RobotSource) -> Iterator[Finding]:
