@@ -39,7 +39,9 @@ _NUMBERS = {
     "mesh": {"scale": 3},
     "dynamics": {"damping": 1, "friction": 1},
     "color": {"rgba": 4},
-    "safety_controller": dict.fromkeys(("soft_lower_limit", "soft_upper_limit"), 1),
+    "safety_controller": dict.fromkeys(
+        ("soft_lower_limit", "soft_upper_limit", "k_position", "k_velocity"), 1
+    ),
     "limit": dict.fromkeys(("lower", "upper", "effort", "velocity"), 1),
 }
 """How many numbers an element's attributes are."""
@@ -254,6 +256,8 @@ def _find_problem(element: Element) -> str:
     scale = element.get("scale", "1")
     if tag == "mesh" and not all(_parsed(scale)):
         return f'scale="{_short(scale)}": a factor must not be zero'
+    if tag == "safety_controller" and element.get("k_velocity") is None:
+        return "the k_velocity is missing, which parsers need"
     if tag == "mesh" and not (element.get("filename") or "").strip():
         return "the filename is missing"
     return ""
