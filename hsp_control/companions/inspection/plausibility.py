@@ -184,8 +184,8 @@ def check_density(xml: Element, robot: Robot) -> Iterator[Finding]:
                 f"link {name!r}",
                 f"{kilograms:.3g} kg in collision shapes of {1e3 * volume:.3g} litres "
                 f"are {kilograms / volume:.2g} kg/m³, denser than any metal",
-                "masses of a URDF are in kg and lengths in m: is one in another unit, or "
-                "does a shape only stand for the link? Distances do not see the rest",
+                "masses of a URDF are in kg and lengths in m: is one in another unit? "
+                "A shape that is smaller than its link hides the rest from distances",
             )
 
 
