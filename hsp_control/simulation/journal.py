@@ -37,6 +37,7 @@ import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import LogError
+from hsp_control.common.regular_file import why_endless
 from hsp_control.common.unicode_text import json_text
 
 MAGIC = b"hsp_control journal 1\n"
@@ -257,7 +258,7 @@ class JournalReader:
     def _frames(self) -> Iterator[tuple[bytes, bytes]]:
         """Yield kind and payload of every new frame before the first incomplete one."""
         try:
-            if self.path.exists() and not self.path.is_file():
+            if self.path.is_dir() or why_endless(self.path):
                 raise LogError(f"{self.path} is not a journal")
             with self.path.open("rb") as file:
                 if not MAGIC.startswith(file.read(len(MAGIC))):

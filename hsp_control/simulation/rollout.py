@@ -15,6 +15,7 @@ import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import LogError
+from hsp_control.common.regular_file import why_endless
 from hsp_control.common.suggestions import did_you_mean, listing
 from hsp_control.common.unicode_text import json_text
 from hsp_control.declaration.language import spoken
@@ -193,10 +194,8 @@ class Rollout:
             made = spoken(f"hsp run {path} writes", "load_experiment(...).run() makes")
             raise LogError(f"{path}: a configuration, not a log; {made} one")
         try:
-            if not (path.is_file() or path.is_dir()) and path.exists():
-                raise LogError(
-                    f"{path}: a device or a pipe, which may never end; no log"
-                )
+            if why := why_endless(path):
+                raise LogError(f"{path}: {why}; no log")
             reading = _read_journal if is_journal(path) else _read_npz
             columns, meta = reading(path)
             if meta.get("format") == FORMAT:
