@@ -38,7 +38,8 @@ _OF_ROBOT: Mapping[str, tuple[_Kinds, str]] = {
     "continuous": (_LIST, "a list"),
     "skeleton_parents": (_LIST, "a list"),
 }
-_ALWAYS = "status", "columns", "robot", "tasks", "limits"
+_ALWAYS = "status", "robot"
+"""Entries without which nothing can be drawn; logs without others can be."""
 
 DRAWN_WIDTHS = {"position": 3, "orientation": 4, "direction": 3}
 """The columns of what can be drawn of a task's reference; a position has one per axis
@@ -79,7 +80,7 @@ def check_kinds(meta: Mapping[str, Any]) -> None:
 
 
 def check_complete(meta: Mapping[str, Any]) -> None:
-    """Check that the entries are there that every log has.
+    """Check that the entries are there that every reader needs.
 
     Raises:
         WrongMetaError: If one is missing.

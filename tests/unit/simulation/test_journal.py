@@ -158,8 +158,6 @@ def test_continuous_joints_are_unwound(tmp_path: Path) -> None:
         "columns": {name: {"unit": "-", "meaning": ""} for name in shapes},
         "robot": {"name": "wheel", "nq": 2, "nv": 1, "dofs": ["turn"],
                   "units": ["rad"], "skeleton_parents": [-1], "continuous": [0]},
-        "tasks": {},
-        "limits": {},
     }  # fmt: skip
     writer.write_heading(shapes, meta)
     for t, angle in zip(turning, wound, strict=True):

@@ -249,10 +249,9 @@ FOREIGN: dict[str, tuple[Callable[[], bytes], str]] = {
         lambda: npz(meta=meta(robot={"nv": 1}, null_space_gain="x"), **TWO),
         "null_space_gain is 'x'; needs 1 x 1 numbers"),
     "an unknown robot": (
-        lambda: npz(meta=meta(status="", columns={}, robot={"name": "a"}, tasks={},
-                              limits={}), **TWO),
+        lambda: npz(meta=meta(status="", robot={"name": "a"}), **TWO),
         r"the log's robot has no 'nq' \(it has name\)"),
-    "no tasks": (lambda: npz(meta=meta(status="", columns={}), **TWO),
+    "no robot": (lambda: npz(meta=meta(status="", columns={}), **TWO),
                  r"the log has no 'robot' \(it has format, status, columns\)"),
     "described column": (lambda: npz(meta=meta(columns={"e": {}}), **TWO),
                          r"the log lacks the column 'e'"),
