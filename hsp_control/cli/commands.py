@@ -24,6 +24,7 @@ from hsp_control.cli.interrupts import INTERRUPTED, DeferredInterrupt
 from hsp_control.cli.loading import read
 from hsp_control.cli.stopwatch import Stopwatch
 from hsp_control.common.exceptions import LogError, SimulationError
+from hsp_control.common.unicode_text import utf8
 from hsp_control.config import Experiment, json_schema
 from hsp_control.config.loaded_scenario import LoadedScenario, load_scenario
 from hsp_control.robot import Robot
@@ -70,7 +71,7 @@ def file_name(words: str) -> str:
     name = re.sub(r"[\s/\\]+", "_", re.sub(r"[,;+]\s*", "-", words))
     if len(name) <= _LONGEST:
         return name
-    return f"{name[: _LONGEST - 9]}-{sha256(words.encode()).hexdigest()[:8]}"
+    return f"{name[: _LONGEST - 9]}-{sha256(utf8(words)).hexdigest()[:8]}"
 
 
 def _log_of(source: Path, options: argparse.Namespace) -> Path:

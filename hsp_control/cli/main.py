@@ -27,10 +27,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
         import argcomplete
 
         argcomplete.autocomplete(parser)
-    options = parser.parse_args(arguments)
+    try:
+        options = parser.parse_args(arguments)
+    except SystemExit as ended:  # after --help or --version, or a mistake
+        if ended.code or not _told_lost_text():
+            raise
+        return FAILURE
     if options.command is None:
         parser.print_help()
-        return 0
+        return FAILURE if _told_lost_text() else 0
     try:
         # Commands are imported only when needed, so that `hsp --help` answers at once.
         from hsp_control.cli import consoles
@@ -45,10 +50,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
         with in_yaml(), consoles.warnings_printed():
             status = int(run(options))
-        if why := lost_text():
-            print(f"hsp: standard output: {why}", file=sys.stderr)
-            return FAILURE
-        return status
+        return FAILURE if _told_lost_text() else status
     except HspControlError as error:
         print(f"hsp: {consoles.message_of(error)}", file=sys.stderr)
     except (
@@ -71,6 +73,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except SystemExit as error:  # of user code; its status may be 0
         print(f"hsp: ended early by SystemExit({error.code!r})", file=sys.stderr)
     return FAILURE
+
+
+def _told_lost_text() -> bool:
+    """Report why standard output has lost text; return whether it has."""
+    why = lost_text()
+    if why:
+        print(f"hsp: standard output: {why}", file=sys.stderr)
+    return bool(why)
 
 
 def _function_of(command: str) -> Any:

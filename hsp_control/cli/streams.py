@@ -76,11 +76,14 @@ def make_usable() -> None:
             file = open(number, kind, encoding="utf-8", closefd=False)  # noqa: SIM115
             setattr(sys, name, file)
         elif number and hasattr(stream, "reconfigure"):
+            # A file's name may have characters that no encoding has: as escapes.
+            lost = "backslashreplace"
             try:
                 _WRITTEN.encode(stream.encoding or "ascii")
             except (UnicodeEncodeError, LookupError):
-                with suppress(OSError, ValueError):
-                    stream.reconfigure(errors="replace")
+                lost = "replace"
+            with suppress(OSError, ValueError):
+                stream.reconfigure(errors=lost)
         if number and _is_standard(getattr(sys, name), number):
             setattr(sys, name, LastingStream(getattr(sys, name), number))
 

@@ -14,7 +14,7 @@ from typing import Any
 from pydantic import BeforeValidator, WithJsonSchema
 
 from hsp_control.common.exceptions import ConfigError
-from hsp_control.common.regular_file import why_no_file
+from hsp_control.common.regular_file import why_endless, why_no_file
 from hsp_control.common.suggestions import did_you_mean, listing
 from hsp_control.declaration.language import spoken
 
@@ -33,7 +33,8 @@ def import_file(path: Path | str) -> None:
     """
     path = Path(path)
     spec = spec_from_file_location(path.stem, path)
-    if not path.is_file() or spec is None or spec.loader is None:
+    ends = path.is_file() and not why_endless(path)
+    if not ends or spec is None or spec.loader is None:
         raise ConfigError(f"{path}: {why_no_file(path)}; needs a .py file")
     known = sys.modules.get(path.stem)
     if known is not None and known.__file__ != str(path):

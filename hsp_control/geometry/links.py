@@ -23,11 +23,16 @@ from hsp_control.geometry.enclosing import (
 from hsp_control.geometry.mesh_loading import mesh_of, why_unread
 from hsp_control.robot import Robot
 from hsp_control.robot.description import mesh_files
-from hsp_control.robot.description.loading import RobotPart
+from hsp_control.robot.description.loading import RobotPart, collect_parser_errors
 from hsp_control.robot.description.mesh_units import MeshUnits, mesh_units
 from hsp_control.robot.description.sources import PINOCCHIO, BodyShape, RobotSource
 from hsp_control.robot.description.srdf import excluded_pairs
-from hsp_control.robot.description.urdf import parser_text, read_urdf
+from hsp_control.robot.description.urdf import (
+    admit_capsules,
+    parser_text,
+    read_urdf,
+    why_no_shape,
+)
 
 Proxy = Literal["capsules", "spheres", "hulls", "meshes"]
 
@@ -147,14 +152,23 @@ def _shapes_of_urdf(robot: Robot, part: RobotPart) -> list[LinkShape]:
     """
     source = part.source
     xml = read_urdf(source)
+    _leave_out_refused(xml, part)
     missing = _locate_meshes(xml, source)
+    admit_capsules(xml)
     text = parser_text(xml, "visual")
-    full = pin.buildModelFromXML(text, mimic=False)
+    parser_errors: list[str] = []
     try:
-        geometry = pin.buildGeomFromUrdfString(full, text, pin.GeometryType.COLLISION)
+        with collect_parser_errors(parser_errors):
+            full = pin.buildModelFromXML(text, mimic=False)
+            geometry = pin.buildGeomFromUrdfString(
+                full, text, pin.GeometryType.COLLISION
+            )
     except (ValueError, RuntimeError) as error:
         reason = why_unread(error)
         raise ModelError(f"{source.urdf}: a collision mesh: {reason}") from error
+    if parser_errors:
+        left_out = "; ".join(dict.fromkeys(parser_errors))
+        _log.warning("%s: Pinocchio leaves out shapes: %s", source.urdf, left_out)
     if missing:
         _report_missing(part, missing, left=len(geometry.geometryObjects))
     shapes = []
@@ -176,6 +190,23 @@ def _shapes_of_urdf(robot: Robot, part: RobotPart) -> list[LinkShape]:
             )
         )
     return shapes
+
+
+def _leave_out_refused(xml: Element, part: RobotPart) -> None:
+    """Remove shapes that the parser refuses, which would take all others of a link."""
+    refused: dict[str, str] = {}
+    for link in xml.iter("link"):
+        for element in link.findall("collision"):
+            if why := why_no_shape(element):
+                refused.setdefault(link.get("name", ""), why)
+                link.remove(element)
+    if refused:
+        _log.warning(
+            "%s: collision shapes of %d links cannot be read, which distances "
+            "therefore do not see: %s (%s)",
+            part.prefix + part.source.name, len(refused), listing(map(repr, refused)),
+            next(iter(refused.values())),
+        )  # fmt: skip
 
 
 def _locate_meshes(xml: Element, source: RobotSource) -> dict[str, str]:

@@ -10,7 +10,9 @@ appended to: the line `MAGIC`, then frames of
     payload
 
 all little-endian. A heading is JSON: the log's meta data and the shape of every column;
-another one follows when columns are added or grow. A row is the columns' numbers in
+another one follows when columns are added or grow. No row can be read without the first
+one, so a copy follows it, and a reader uses whichever is whole; a journal without the
+copy, as was written once, is as valid. A row is the columns' numbers in
 the order of the heading. The end is JSON: the status of the run and more. A note is
 JSON of another kind: a sweep's journal has one per run.
 A frame is one `write`. After that the operating system has it, and a killed process
@@ -35,6 +37,8 @@ import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import LogError
+from hsp_control.common.regular_file import why_endless
+from hsp_control.common.unicode_text import json_text
 
 MAGIC = b"hsp_control journal 1\n"
 KILLED = "the journal has no end: its writer was killed"
@@ -79,6 +83,7 @@ class JournalWriter:
             if not kept:
                 self._put(MAGIC)
             self._size = kept or len(MAGIC)
+            self._begins = not kept
         except BaseException as error:
             self.close()
             if isinstance(error, OSError):
@@ -87,8 +92,12 @@ class JournalWriter:
         _writers.add(self)
 
     def write_heading(self, shapes: Shapes, meta: Mapping[str, Any]) -> None:
-        """Write a heading for the next rows."""
-        self._frame(_HEADING, _json({"columns": shapes, "meta": meta}))
+        """Write a heading for the next rows; the first one, which all need, twice."""
+        payload = _json({"columns": shapes, "meta": meta})
+        self._frame(_HEADING, payload)
+        if self._begins:
+            self._frame(_HEADING, payload)
+        self._begins = False
 
     def write_row(self, numbers: Array) -> None:
         """Write a row, shape (n,): the numbers of all columns of the last heading."""
@@ -172,6 +181,8 @@ class JournalReader:
         self.notes: list[Any] = []  # all of them
         self.damaged = 0  # the frames that were left out
         self._most, self._at = most, len(MAGIC)
+        # the bytes of the first heading's frame, once it was read
+        self._heading_size: int | None = None
         self._parts: list[tuple[Shapes, list[Array]]] = []
 
     def read(self) -> int:
@@ -247,7 +258,7 @@ class JournalReader:
     def _frames(self) -> Iterator[tuple[bytes, bytes]]:
         """Yield kind and payload of every new frame before the first incomplete one."""
         try:
-            if self.path.exists() and not self.path.is_file():
+            if self.path.is_dir() or why_endless(self.path):
                 raise LogError(f"{self.path} is not a journal")
             with self.path.open("rb") as file:
                 if not MAGIC.startswith(file.read(len(MAGIC))):
@@ -269,14 +280,29 @@ class JournalReader:
                 after = _next_frame(data, at)
                 if after is None:
                     return
-                self.damaged += 1
+                # No row is lost with the first heading or its copy.
+                if not self._at_heading(data, at, after):
+                    self.damaged += 1
                 self._at += after - at
                 at = after
                 continue
-            kind = data[at : at + 1]
-            at += _FRAME.size + len(payload)
-            self._at += _FRAME.size + len(payload)
+            kind, size = data[at : at + 1], _FRAME.size + len(payload)
+            if kind == _HEADING and self._heading_size is None:
+                self._heading_size = size
+            at += size
+            self._at += size
             yield kind, payload
+
+    def _at_heading(self, data: bytes, at: int, after: int) -> bool:
+        """Return whether a damaged frame is the first heading, or its copy.
+
+        Then it is as long as the other one, which is before it or after it.
+        """
+        if self._at == len(MAGIC):
+            kind, length, _ = _FRAME.unpack_from(data, after)
+            return bool(kind == _HEADING and _FRAME.size + length == after - at)
+        first = self._heading_size
+        return after - at == first and self._at == len(MAGIC) + first
 
 
 def _whole_frame(data: bytes, at: int) -> bytes | None:
@@ -365,4 +391,4 @@ def joined(
 
 
 def _json(data: Any) -> bytes:
-    return json.dumps(data, ensure_ascii=False).encode()
+    return json_text(data).encode()

@@ -15,11 +15,19 @@ import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import LogError
+from hsp_control.common.regular_file import why_endless
 from hsp_control.common.suggestions import did_you_mean, listing
+from hsp_control.common.unicode_text import json_text
 from hsp_control.declaration.language import spoken
 from hsp_control.robot import Robot, RobotState
 from hsp_control.robot.recorded import warn_of_another_robot
 from hsp_control.simulation.journal import KILLED, JournalReader, is_journal
+from hsp_control.simulation.log_meta import (
+    WrongMetaError,
+    check_complete,
+    check_kinds,
+    check_robot,
+)
 from hsp_control.simulation.log_shapes import WrongColumnError, check_columns
 from hsp_control.simulation.run_summary import damped_rows, summary_text
 
@@ -31,9 +39,9 @@ FORMAT = "hsp_control rollout 1"
 _REQUIRED = ("t", "q", "v", "tau")
 _UNREADABLE = (
     OSError, ValueError, EOFError, KeyError, NotImplementedError,
-    zipfile.BadZipFile, zlib.error, RecursionError, MemoryError, TypeError,
+    zipfile.BadZipFile, zlib.error, RuntimeError, MemoryError, TypeError,
 )  # fmt: skip
-"""The errors of a file that is truncated, damaged or something else."""
+"""The errors of a file that is truncated, damaged, something else or encrypted."""
 
 
 class Rollout:
@@ -156,7 +164,7 @@ class Rollout:
         path = Path(path)
         part = path.with_name(f".{path.name}.part")
         arrays: dict[str, Any] = {
-            "meta": np.array(json.dumps(self.meta, ensure_ascii=False)), **self.columns
+            "meta": np.array(json_text(self.meta)), **self.columns
         }  # fmt: skip
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
@@ -186,15 +194,14 @@ class Rollout:
             made = spoken(f"hsp run {path} writes", "load_experiment(...).run() makes")
             raise LogError(f"{path}: a configuration, not a log; {made} one")
         try:
-            if not (path.is_file() or path.is_dir()) and path.exists():
-                raise LogError(
-                    f"{path}: a device or a pipe, which may never end; no log"
-                )
+            if why := why_endless(path):
+                raise LogError(f"{path}: {why}; no log")
             reading = _read_journal if is_journal(path) else _read_npz
             columns, meta = reading(path)
             if meta.get("format") == FORMAT:
+                check_kinds(meta)
                 check_columns(columns, meta)
-        except WrongColumnError as error:
+        except (WrongColumnError, WrongMetaError) as error:
             raise LogError(f"{path}: {error}") from None
         except LogError:
             raise
@@ -218,6 +225,10 @@ class Rollout:
         for name in (*_REQUIRED, *meta.get("columns", ())):
             if name not in columns:
                 raise LogError(f"{path}: the log lacks the column {name!r}")
+        try:
+            check_complete(meta)
+        except WrongMetaError as error:
+            raise LogError(f"{path}: {error}") from None
         return cls(columns, meta)
 
 
@@ -230,6 +241,8 @@ def _read_journal(path: Path) -> tuple[dict[str, Array], dict[str, Any]]:
         why = "has no whole heading: it is damaged" if reader.damaged else why
         raise LogError(f"{path}: the journal {why}")
     columns, meta = reader.rows(0), reader.meta
+    check_kinds(meta)
+    check_robot(meta)
     check_columns(columns, meta)
     complete_columns(columns, meta["robot"]["continuous"])
     if not reader.ended:

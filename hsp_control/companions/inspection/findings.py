@@ -15,13 +15,19 @@ from hsp_control.companions.inspection.finding import Finding as Finding
 from hsp_control.companions.inspection.finding import Severity
 from hsp_control.companions.inspection.plausibility import (
     check_angles,
+    check_density,
     check_gyration,
+    check_maxima,
+    check_mesh_sizes,
     check_size,
 )
 from hsp_control.companions.inspection.reading import (
+    check_continuous,
     check_followers,
+    check_friction,
     check_mesh_axes,
     check_planar_axes,
+    check_shapes,
     check_soft_limits,
     check_srdf,
     check_transmissions,
@@ -353,10 +359,12 @@ def inspect(description: RobotDescription, access: Access = ANYWHERE) -> Inspect
         if not findings:
             findings += [*check_inertias(xml), *check_limits(xml), *check_angles(xml)]
             findings += [*check_soft_limits(xml), *check_followers(xml)]
+            findings += [*check_continuous(xml), *check_friction(xml)]
+            findings += [*check_maxima(xml), *check_mesh_sizes(xml, source)]
             findings += [*check_planar_axes(xml), *check_unread(xml)]
             findings += check_transmissions(xml)
             findings += [*check_meshes(xml, source), *check_mesh_axes(xml, source)]
-            findings += check_srdf(xml, source)
+            findings += [*check_shapes(xml), *check_srdf(xml, source)]
         errors = [f for f in findings if f.severity == "error"]
         if all(error.check == "inertia" for error in errors):
             if errors:
@@ -367,6 +375,7 @@ def inspect(description: RobotDescription, access: Access = ANYWHERE) -> Inspect
                 found, facts = _of_robot(robot)
                 findings += found
                 findings += check_gyration(xml, robot, _points_of_shapes(robot))
+                findings += check_density(xml, robot)
             except ModelError as error:
                 reason = _reason(error, source)
                 findings.append(Finding("error", "robot", source.name, reason))

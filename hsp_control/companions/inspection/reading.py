@@ -12,6 +12,7 @@ from hsp_control.robot.description.mesh_units import MeshUnits, mesh_units
 from hsp_control.robot.description.mimics import followers
 from hsp_control.robot.description.motor_inertia import transmissions
 from hsp_control.robot.description.sources import RobotSource
+from hsp_control.robot.description.urdf import why_no_shape
 
 _READ = {
     "robot": {"link", "joint", "material"},
@@ -119,6 +120,49 @@ def check_soft_limits(xml: Element) -> Iterator[Finding]:
 
 
 _ENDS = "lower", "upper"
+_SOFT_ENDS = "soft_lower_limit", "soft_upper_limit"
+
+
+def check_continuous(xml: Element) -> Iterator[Finding]:
+    """Yield the continuous joints with limits of their position."""
+    given = (
+        ("limit", _ENDS, "limit", "limits"),
+        ("safety_controller", _SOFT_ENDS, "soft limits", "soft limits"),
+    )
+    for joint in xml.findall("joint"):
+        if joint.get("type") != "continuous":
+            continue
+        for tag, names, check, what in given:
+            element = joint.find(tag)
+            low, high = (_number(element, name) for name in names)
+            if low != high:
+                yield Finding(
+                    "note",
+                    check,
+                    f"joint {joint.get('name', '')!r}",
+                    f"its {what} {low:g} to {high:g} are not used: it is continuous",
+                    "if it has limits, give it type revolute",
+                )
+
+
+def _number(element: Element | None, name: str) -> float:
+    return 0.0 if element is None else float(element.get(name, 0.0))
+
+
+def check_friction(xml: Element) -> Iterator[Finding]:
+    """Yield the joints whose damping or friction is negative."""
+    for joint in xml.findall("joint"):
+        for name in ("damping", "friction"):
+            value = _number(joint.find("dynamics"), name)
+            if value < 0.0:
+                yield Finding(
+                    "warning",
+                    "dynamics",
+                    f"joint {joint.get('name', '')!r}",
+                    f"its {name} {value:g} is negative, as of a joint that gains "
+                    f"energy: {-value:g} is used",
+                    "give it without the sign",
+                )
 
 
 def check_planar_axes(xml: Element) -> Iterator[Finding]:
@@ -155,6 +199,20 @@ def check_mesh_axes(xml: Element, source: RobotSource) -> Iterator[Finding]:
             "unlike in RViz",
             "if the robot looks wrong, write <up_axis>Z_UP",
         )
+
+
+def check_shapes(xml: Element) -> Iterator[Finding]:
+    """Yield the links with collision shapes that parsers refuse."""
+    for link in xml.findall("link"):
+        for element in link.findall("collision"):
+            if why := why_no_shape(element):
+                yield Finding(
+                    "warning",
+                    "shape",
+                    f"link {link.get('name', '')!r}",
+                    f"a collision shape: {why}",
+                    "distances leave out this shape: give the link another one",
+                )
 
 
 def check_srdf(xml: Element, source: RobotSource) -> Iterator[Finding]:

@@ -8,6 +8,7 @@ from matplotlib.mathtext import MathTextParser
 from matplotlib.transforms import ScaledTranslation
 
 from hsp_control.common.arrays import Array
+from hsp_control.common.unicode_text import encodable
 from hsp_control.companions.plots import palette
 from hsp_control.companions.plots.analysis import floor_of
 from hsp_control.companions.plots.log_series import (
@@ -65,6 +66,7 @@ def note(axes: Axes, text: str) -> None:
 
 def math_text(name: str) -> str:
     """Return a name in which ``$K_N$`` is mathematics, if that can be drawn."""
+    name = encodable(name)
     if name.count("$") and not name.count("$") % 2:
         try:
             MathTextParser("path").parse(name)
@@ -76,7 +78,7 @@ def math_text(name: str) -> str:
 
 def literal_text(name: str) -> str:
     """Return a text that matplotlib shows as it is, also with $ or a leading _."""
-    shown = name.replace("$", r"\$")
+    shown = encodable(name).replace("$", r"\$")
     return f" {shown}" if shown.startswith("_") else shown
 
 

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from hsp_control.common.arrays import Array
 from hsp_control.simulation import Rollout
+from hsp_control.simulation.log_meta import drawn_widths
 from hsp_control.simulation.measures import distances
 
 
@@ -31,9 +32,8 @@ class TaskPath(NamedTuple):
 def drawn_parts(rollout: Rollout, name: str) -> dict[str, slice]:
     """Return the columns of a task's reference that can be drawn, by their quantity."""
     about = rollout.meta["tasks"][name]
-    drawn, axes = about.get("drawn", ()), about.get("axes")
-    widths = {"position": len(axes or "xyz"), "orientation": 4, "direction": 3}
-    ends = list(accumulate((widths[part] for part in drawn), initial=0))
+    drawn = drawn_widths(about)
+    ends = list(accumulate(drawn.values(), initial=0))
     return {part: slice(*ends[k : k + 2]) for k, part in enumerate(drawn)}
 
 
@@ -53,6 +53,11 @@ def task_path(rollout: Rollout, name: str) -> TaskPath | None:
     desired = path.copy()
     desired[:, tracked] = rollout[f"task.{name}.reference"][:, where]
     return TaskPath(name, desired, path, axes)
+
+
+def finite_points(points: Array) -> Array:
+    """Return the points that can be drawn, shape (K, 3): a log may have NaN in rows."""
+    return points[np.isfinite(points).all(axis=1)]
 
 
 def joint_names(rollout: Rollout) -> list[str]:

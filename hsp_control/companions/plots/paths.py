@@ -10,6 +10,7 @@ from matplotlib.ticker import MaxNLocator
 from hsp_control.common.arrays import Array
 from hsp_control.companions.plots import palette
 from hsp_control.companions.plots.curves import legend_below, literal_text, note
+from hsp_control.companions.plots.log_series import finite_points
 from hsp_control.companions.plots.world import (
     View,
     best_plane,
@@ -249,7 +250,6 @@ def _desired_label(axes: str, view: View) -> str:
 
 def _path_points(rollout: Rollout) -> Array:
     """Return the points of all paths, or of the robot's ends [m], shape (K, 3)."""
-    paths = task_paths(rollout)
-    if not paths:
-        return end_points(rollout).reshape(-1, 3)
-    return np.concatenate([points for path in paths for points in path[1:3]])
+    paths = [points for path in task_paths(rollout) for points in path[1:3]]
+    points = finite_points(np.concatenate([np.zeros((0, 3)), *paths]))
+    return points if len(points) else end_points(rollout).reshape(-1, 3)

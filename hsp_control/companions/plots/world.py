@@ -11,7 +11,7 @@ from matplotlib.patches import Circle, Polygon
 
 from hsp_control.common.arrays import Array
 from hsp_control.companions.plots import palette
-from hsp_control.companions.plots.log_series import TaskPath, task_path
+from hsp_control.companions.plots.log_series import TaskPath, finite_points, task_path
 from hsp_control.simulation import Rollout
 from hsp_control.simulation.measures import task_names
 
@@ -246,7 +246,8 @@ def center_points(rollout: Rollout) -> Array:
 
 def _robot_and_paths(rollout: Rollout) -> list[Array]:
     paths = task_paths(rollout)
-    return [rollout["skeleton"].reshape(-1, 3), *(path.desired for path in paths)]
+    desired = (finite_points(path.desired) for path in paths)
+    return [rollout["skeleton"].reshape(-1, 3), *desired]
 
 
 def draw_skeleton(

@@ -7,6 +7,7 @@ import numpy as np
 import umsgpack  # type: ignore[import-untyped]
 
 from hsp_control.common.arrays import Array
+from hsp_control.common.unicode_text import encodable
 
 Json = dict[str, Any]
 
@@ -177,7 +178,7 @@ def set_status(text: str) -> PageCommand:
 
 def forget_clip() -> PageCommand:
     """Return the command that removes the clip; an open page continues to play."""
-    packed = umsgpack.packb({"type": "nothing", "path": CLIP})
+    packed = pack({"type": "nothing", "path": CLIP})
     return PageCommand(CLIP, key_of(CLIP, "nothing"), packed, deletes=True)
 
 
@@ -197,6 +198,24 @@ def typed_array(values: Any, dtype: type[np.generic]) -> umsgpack.Ext:
     return umsgpack.Ext(kinds[dtype], np.ascontiguousarray(values, dtype).tobytes())
 
 
+def pack(data: Json) -> bytes:
+    """Return plain data in MessagePack; texts that name any file are `encodable`."""
+    try:
+        return bytes(umsgpack.packb(data))
+    except UnicodeEncodeError:
+        return bytes(umsgpack.packb(_encodable(data)))
+
+
+def _encodable(data: Any) -> Any:
+    if isinstance(data, str):
+        return encodable(data)
+    if isinstance(data, dict):
+        return {_encodable(key): _encodable(value) for key, value in data.items()}
+    if isinstance(data, list | tuple):
+        return [_encodable(each) for each in data]
+    return data
+
+
 def unpack(packed: bytes) -> Json:
     """Return a command as plain data, its typed arrays as NumPy arrays."""
     kinds = {
@@ -214,7 +233,7 @@ def unpack(packed: bytes) -> Json:
 
 def page_command(kind: str, path: str, name: str, **fields: Any) -> PageCommand:
     """Return the command of a kind that sets a property of a node."""
-    packed = umsgpack.packb({"type": kind, "path": path, **fields})
+    packed = pack({"type": kind, "path": path, **fields})
     return PageCommand(path, key_of(path, name), packed)
 
 

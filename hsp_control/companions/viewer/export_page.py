@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from hsp_control.common.exceptions import ExportError
+from hsp_control.common.unicode_text import utf8
 from hsp_control.companions.viewer.commands import Json
 from hsp_control.companions.viewer.comparison import (
     GHOST_OPACITY,
@@ -68,7 +69,7 @@ def write_page(path: Path, text: str) -> Path:
     part = path.parent / f".{path.name}.part"  # also of "."
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        part.write_text(text, encoding="utf-8")
+        part.write_bytes(utf8(text))
         part.replace(path)
     except OSError as error:
         with suppress(OSError):

@@ -4,12 +4,11 @@ import hashlib
 from collections.abc import Iterable, Iterator
 from typing import Any
 
-import umsgpack  # type: ignore[import-untyped]
-
 from hsp_control.companions.viewer.commands import (
     MESHES,
     Json,
     PageCommand,
+    pack,
     page_command,
 )
 
@@ -41,7 +40,7 @@ class MeshFiles:
         if not str(owner["type"]).startswith("_meshfile"):
             return owner
         content = {key: owner[key] for key in _FILE if key in owner}
-        name = hashlib.sha256(umsgpack.packb(content)).hexdigest()[:24]
+        name = hashlib.sha256(pack(content)).hexdigest()[:24]
         if name not in self._known:
             known = page_command("mesh_file", MESHES, name, file=name, **content)
             self._known[name] = known

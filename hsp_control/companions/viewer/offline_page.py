@@ -8,13 +8,12 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
-import umsgpack  # type: ignore[import-untyped]
-
 from hsp_control.companions.viewer.commands import (
     CAPTION,
     PLOTS,
     LatestCommands,
     key_of,
+    pack,
     unpack,
 )
 from hsp_control.companions.viewer.packing import ArrayTable, reduce_scene
@@ -65,7 +64,7 @@ def scene_page(
             "</head>",
             f"<body>{body.rstrip()}",
             _block("scripts", json.dumps(scripts).encode()),
-            _block("content", umsgpack.packb(content)),
+            _block("content", pack(content)),
             f"<script>{_text('offline_start.js')}</script>",
             "</body>",
             "</html>",

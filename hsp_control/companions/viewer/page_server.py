@@ -19,7 +19,6 @@ from pathlib import Path
 from threading import Lock, Thread
 from typing import Any, NamedTuple, NoReturn
 
-import umsgpack  # type: ignore[import-untyped]
 from tornado.httpserver import HTTPServer
 from tornado.web import Application, HTTPError, RequestHandler
 from tornado.websocket import WebSocketClosedError, WebSocketHandler
@@ -30,6 +29,7 @@ from hsp_control.companions.viewer.commands import (
     LatestCommands,
     PageCommand,
     key_of,
+    pack,
 )
 
 _LARGE = 100_000  # bytes of a message from which on it is compressed: meshes
@@ -262,7 +262,7 @@ class Page(WebSocketHandler):
 
     def command(self, path: str, name: str, **command: Any) -> None:
         """Send a message to this page."""
-        packed = umsgpack.packb({"path": path, **command})
+        packed = pack({"path": path, **command})
         with self.hub.lock:
             self.pending.keep([PageCommand(path, key_of(path, name), packed)])
         self.has_pending.set()

@@ -6,7 +6,11 @@ from typing import NamedTuple
 import numpy as np
 
 from hsp_control.common.arrays import Array, Indices
-from hsp_control.companions.plots.log_series import drawn_parts, task_path
+from hsp_control.companions.plots.log_series import (
+    drawn_parts,
+    finite_points,
+    task_path,
+)
 from hsp_control.companions.plots.palette import ACTUAL, DESIRED, OBSTACLE, TASK
 from hsp_control.companions.viewer import threejs
 from hsp_control.companions.viewer.commands import (
@@ -60,12 +64,26 @@ def read_targets(rollout: Rollout) -> list[TaskTarget]:
                 name,
                 # Without a position: the last frame that a task tracks.
                 rollout["skeleton"][:, -1] if path is None else path.actual,
-                None if path is None else path.desired,
-                None if turned is None else reference[:, turned],
-                None if pointed is None else reference[:, pointed],
+                None if path is None else _held(path.desired),
+                None if turned is None else _held(reference[:, turned]),
+                None if pointed is None else _held(reference[:, pointed]),
             )
         )
     return targets
+
+
+def _held(values: Array) -> Array | None:
+    """Return values of which each row without numbers repeats the one before it.
+
+    A page moves only to numbers. None if there are none.
+    """
+    finite = np.isfinite(values).all(axis=1)
+    if finite.all():
+        return values
+    if not finite.any():
+        return None
+    last = np.maximum.accumulate(np.where(finite, np.arange(len(values)), -1))
+    return values[np.where(last < 0, np.argmax(finite), last)]
 
 
 def target_markers(motion: RunMotion, root: str) -> Layer:
@@ -116,7 +134,7 @@ def _mark(target: TaskTarget, radius: float) -> Json:
 def desired_points(motion: RunMotion) -> Array:
     """Return points of the desired paths [m], shape (K, 3)."""
     found = [t.desired for t in read_targets(motion.rows) if t.desired is not None]
-    return np.concatenate([np.zeros((0, 3)), *found])
+    return finite_points(np.concatenate([np.zeros((0, 3)), *found]))
 
 
 def paths(

@@ -8,14 +8,15 @@ import pinocchio as pin
 
 from hsp_control.common.suggestions import listing
 
-_MOVING_PART = "finger|thumb|jaw|knuckle|claw|pincer"
+_MOVING_PART = "finger|thumb|digit|jaw|knuckle|claw|pincer"
 _GRIPPER = re.compile(f"{_MOVING_PART}|gripper")
 _PART = re.compile(_MOVING_PART)
 """Names of links that a gripper's joint moves; a wrist may move a gripper, too."""
 _ARM = re.compile("wrist|roll|pitch|yaw|rotat|flex")
 """Names of joints that move a gripper, unless they also name an arm's joint."""
 _NO_HAND = re.compile(
-    "finger|thumb|camera|imu|sensor|range|accelerometer|laser|optical|force|(^|_)ft_frame"
+    "finger|thumb|digit|camera|imu|sensor|range|accelerometer|laser|optical|force"
+    "|(^|_)ft_frame"
 )
 """Names of links on a last joint that are less likely the hand than others."""
 _HANDS = (

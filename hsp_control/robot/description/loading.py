@@ -152,7 +152,7 @@ def _parse(source: RobotSource, settings: OneRobot, xml: Element) -> pin.Model:
     parser_errors: list[str] = []
     root = cast("Root", settings.root or source.root)  # text is for MJCF only
     try:
-        with _collect_parser_errors(parser_errors):
+        with collect_parser_errors(parser_errors):
             _write_for_pinocchio(xml, source, mimic=mimic)
             text = parser_text(xml, "visual", "collision")
             if root == "fixed":
@@ -197,7 +197,7 @@ def _check_inertias(xml: Element, source: RobotSource) -> None:
 
 
 @contextmanager
-def _collect_parser_errors(errors: list[str]) -> Iterator[None]:
+def collect_parser_errors(errors: list[str]) -> Iterator[None]:
     """Collect the "Error:" lines that the URDF parser writes to the process's stderr.
 
     Its exceptions report only that a URDF is invalid; these lines give the reason.

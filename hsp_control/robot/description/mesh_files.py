@@ -10,6 +10,7 @@ from pathlib import Path
 from urllib.parse import unquote
 
 from hsp_control.common.exceptions import AccessError
+from hsp_control.common.regular_file import why_endless
 from hsp_control.common.resources import is_file
 from hsp_control.robot.description.access import (
     Access,
@@ -43,7 +44,7 @@ _LIBRARY = re.compile(rb"^[ \t]*mtllib[ \t]+(.+)$", re.M)
 
 def find_problem(file: Path) -> str:
     """Return why a mesh file cannot be used, or an empty string."""
-    if not file.is_file():  # reading a pipe would block
+    if not file.is_file() or why_endless(file):  # reading would block
         return "not a file" if _is_there(file) else "no such file"
     try:
         size = file.stat().st_size

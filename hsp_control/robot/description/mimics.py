@@ -18,6 +18,7 @@ from xml.etree.ElementTree import Element, SubElement
 import pinocchio as pin
 
 from hsp_control.common.exceptions import ModelError
+from hsp_control.common.suggestions import did_you_mean
 
 _SINGLE = ("revolute", "continuous", "prismatic")
 """Types of joints with one degree of freedom, which can lead and follow."""
@@ -76,9 +77,10 @@ def followers(robot: Element) -> list[Follower]:
             for each, does in ((way[-1], "mimics"), (leader, "is mimicked")):
                 kind = joints[each].get("type") if each in joints else "fixed"
                 if does == "is mimicked" and kind == "fixed":
+                    near = "" if leader in joints else did_you_mean(leader, joints)
                     raise ModelError(
                         f"joint {way[-1]!r} mimics {leader!r}, which is not a moving "
-                        f"joint; {_HINT}"
+                        f"joint{near}; {_HINT}"
                     )
                 if kind not in _SINGLE:
                     raise ModelError(

@@ -39,17 +39,27 @@ _NUMBERS = {
     "mesh": {"scale": 3},
     "dynamics": {"damping": 1, "friction": 1},
     "color": {"rgba": 4},
-    "safety_controller": dict.fromkeys(("soft_lower_limit", "soft_upper_limit"), 1),
+    "safety_controller": dict.fromkeys(
+        ("soft_lower_limit", "soft_upper_limit", "k_position", "k_velocity"), 1
+    ),
     "limit": dict.fromkeys(("lower", "upper", "effort", "velocity"), 1),
 }
 """How many numbers an element's attributes are."""
 _LENGTHS = {"box", "cylinder", "capsule", "sphere"}
+_SHAPES = {
+    "box": {"size"},
+    "cylinder": {"radius", "length"},
+    "capsule": {"radius", "length"},
+    "sphere": {"radius"},
+    "mesh": {"filename"},
+}
+"""The shapes that a URDF can have, and the attributes that each needs."""
 _SINGLE = {
     "link": {"inertial"},
     "inertial": {"origin", "mass", "inertia"},
     "visual": {"origin", "geometry"},
     "collision": {"origin", "geometry"},
-    "geometry": {"box", "cylinder", "capsule", "sphere", "mesh"},
+    "geometry": set(_SHAPES),
     "joint": {
         "origin",
         "parent",
@@ -187,6 +197,26 @@ def named_files(robot: Element) -> Iterator[tuple[str, str]]:
             yield name, f"{owner}<{element.tag}>"
 
 
+def why_no_shape(element: Element) -> str:
+    """Return why parsers refuse a link's shape, or an empty string.
+
+    With it they refuse all other shapes of that use of the link.
+    """
+    shape = element.find("geometry/*")
+    if shape is None:
+        return "a shape without geometry"
+    if shape.tag not in _SHAPES:
+        return f"<{shape.tag}> is none of {listing(f'<{tag}>' for tag in _SHAPES)}"
+    missing = sorted(_SHAPES[shape.tag].difference(shape.keys()))
+    return f"<{shape.tag}> without {' and '.join(missing)}" if missing else ""
+
+
+def admit_capsules(xml: Element) -> None:
+    """Let parsers accept a URDF's capsules, which those of version 1.0 have not."""
+    if xml.get("version", "1.0") in ("1", "1.0") and xml.find(".//capsule") is not None:
+        xml.set("version", "1.1")
+
+
 def parser_text(xml: Element, *unused: str) -> str:
     """Return a URDF's text for the parser, without ``unused`` elements of links."""
     for link in xml.iter("link"):
@@ -226,6 +256,8 @@ def _find_problem(element: Element) -> str:
     scale = element.get("scale", "1")
     if tag == "mesh" and not all(_parsed(scale)):
         return f'scale="{_short(scale)}": a factor must not be zero'
+    if tag == "safety_controller" and element.get("k_velocity") is None:
+        return "the k_velocity is missing, which parsers need"
     if tag == "mesh" and not (element.get("filename") or "").strip():
         return "the filename is missing"
     return ""

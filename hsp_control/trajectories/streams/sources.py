@@ -8,6 +8,7 @@ from weakref import WeakValueDictionary, ref
 
 from hsp_control.common.entry_points import entry_points
 from hsp_control.common.exceptions import StreamError
+from hsp_control.common.regular_file import why_endless
 from hsp_control.trajectories.streams.inbox import Inbox
 from hsp_control.trajectories.streams.message import Message, Space, message_of, parsed
 
@@ -105,8 +106,10 @@ def recorded(data: Sequence[Mapping[str, Any]], space: Space) -> list[Message]:
 def read_recording(path: Path) -> list[dict[str, Any]]:
     """Return the messages in a file of JSON lines."""
     try:
-        if path.exists() and not path.is_file():
-            raise StreamError(f"{path}: no file, but a folder, a device or a pipe")
+        if path.is_dir():
+            raise StreamError(f"{path}: no file, but a folder")
+        if why := why_endless(path):
+            raise StreamError(f"{path}: {why}; no recording")
         if (size := path.stat().st_size) > LARGEST_FILE:
             raise StreamError(
                 f"{path}: {size} bytes; a recording has at most {LARGEST_FILE}"

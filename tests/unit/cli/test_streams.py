@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 from places import covering
 
+from hsp_control import load_experiment
 from hsp_control.common.exceptions import (
     ConfigError,
     LogError,
@@ -56,6 +57,25 @@ def test_any_text_can_be_written(closed: tuple[int, ...], encoding: str) -> None
         assert done.stdout.strip() == expected.get(encoding, "\u00b5 \u2264".encode())
 
 
+@pytest.mark.process
+@pytest.mark.smoke
+def test_a_configuration_whose_name_is_not_utf8_is_run(tmp_path: Path) -> None:
+    name = b"caf\xe9.yaml".decode(errors="surrogateescape")
+    short = "robot: {name: planar3r}\ntasks: {}\nsimulation: {duration: 0.01}\n"
+    (tmp_path / name).write_text(short)
+    done = subprocess.run(
+        [sys.executable, "-m", "hsp_control", "run", name],
+        env={**os.environ, "PYTHONIOENCODING": "utf-8:strict"},
+        cwd=tmp_path,
+        capture_output=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr.decode()
+    assert done.stdout.decode().endswith("Log: out/caf\\udce9.npz\n")
+    log = Rollout.load(tmp_path / "out" / Path(name).with_suffix(".npz"))
+    assert log.meta["name"] == Path(name).stem
+
+
 LONG = """
 import sys
 from hsp_control.cli.streams import lost_text, make_usable
@@ -89,11 +109,14 @@ def test_a_command_continues_when_its_output_is_closed(where: str) -> None:
 
 
 @pytest.mark.parametrize(("where", "status"), [("/dev/full", 2), ("/dev/null", 0)])
+@pytest.mark.parametrize("words", ["robots panda", "run --help", "--version", ""])
 @pytest.mark.process
 @pytest.mark.smoke
-def test_the_status_reports_whether_all_was_written(where: str, status: int) -> None:
+def test_the_status_reports_whether_all_was_written(
+    words: str, where: str, status: int
+) -> None:
     with Path(where).open("w") as file:
-        command = [sys.executable, "-m", "hsp_control", "robots", "panda"]
+        command = [sys.executable, "-m", "hsp_control", *words.split()]
         done = subprocess.run(command, stdout=file, stderr=subprocess.PIPE, text=True)
     reported = "hsp: standard output: No space left on device" if status else ""
     assert (done.returncode, done.stderr.strip()) == (status, reported)
@@ -106,18 +129,21 @@ def test_the_schema_needs_no_docstrings() -> None:
     subprocess.run([sys.executable, "-OO", "-c", code], check=True)
 
 
-@pytest.mark.parametrize("kind", ["fifo", "device"])
+@pytest.mark.parametrize("kind", ["fifo", "device", "kernel"])
 def test_endless_inputs_are_no_log_and_no_recording(kind: str, tmp_path: Path) -> None:
     path = tmp_path / "a.npz"
     if kind == "fifo":
         os.mkfifo(path)
     else:
-        path.symlink_to("/dev/zero")
-    with pytest.raises(LogError, match="a device or a pipe"):
+        path.symlink_to("/dev/zero" if kind == "device" else "/proc/kmsg")
+    which = "a file of the kernel" if kind == "kernel" else "a device or a pipe"
+    with pytest.raises(LogError, match=f"{which}, which may never end; no log"):
         Rollout.load(path)
     with pytest.raises(LogError, match="is not a journal"):
         JournalReader(path).read()
-    with pytest.raises(StreamError, match="no file, but a folder, a device or a pipe"):
+    with pytest.raises(StreamError, match=f"{which}, which may never end; no rec"):
         read_recording(path)
-    with pytest.raises(ConfigError, match=r"a device or a pipe, .*; needs a \.py file"):
-        import_file(path)
+    with pytest.raises(ConfigError, match=which):
+        load_experiment(path.rename(path.with_suffix(".yaml")))
+    with pytest.raises(ConfigError, match=rf"{which}, .*; needs a \.py file"):
+        import_file(path.with_suffix(".yaml").rename(path.with_suffix(".py")))

@@ -79,6 +79,18 @@ def test_a_recorder_that_begins_later_repeats_its_part(tmp_path: Path) -> None:
     np.testing.assert_allclose(again.q, log.q, atol=2e-3)
 
 
+def test_an_error_that_names_a_file_of_another_encoding_keeps_its_log(
+    tmp_path: Path,
+) -> None:
+    """Its bytes are lone surrogates, which UTF-8 does not have."""
+    path, controller = tmp_path / "mine.npz", law(hsp.JointCentering())
+    message = b"no column in caf\xe9.csv".decode(errors="surrogateescape")
+    with suppress(ValueError), hsp.Recorder(controller, path) as recorder:
+        run(controller, recorder, 2)
+        raise ValueError(message)
+    assert hsp.Rollout.load(path).meta["message"].endswith(message)
+
+
 def test_sent_efforts_and_their_durations_are_recorded(
     tmp_path: Path,
 ) -> None:

@@ -47,6 +47,26 @@ def test_shapes_hang_where_pinocchio_puts_them(name: str, proxy: str) -> None:
         np.testing.assert_allclose(own.homogeneous, theirs.homogeneous, atol=1e-12)
 
 
+def test_a_capsule_is_a_shape_and_what_is_none_leaves_the_others(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """The parser would drop all shapes of the link."""
+    robot = odd_robot(
+        tmp_path,
+        collision('<ellipsoid size="0.1 0.1 0.2"/>')
+        + collision("<sphere/>")
+        + collision('<capsule radius="0.04" length="0.3"/>')
+        + collision('<box size="0.2 0.3 0.1"/>'),
+    )
+    with caplog.at_level(logging.WARNING):
+        capsule, box = link_shapes(robot, "meshes")
+    assert (capsule.geometry.radius, capsule.geometry.halfLength) == (0.04, 0.15)
+    assert isinstance(box.geometry, coal.Box)
+    assert "of 1 links cannot be read, which distances therefore" in caplog.text
+    assert f"{capsule.link!r} (<ellipsoid> is none of <box>, <cylinder>" in caplog.text
+    assert capfd.readouterr().err == ""
+
+
 def test_boxes_lone_cylinders_and_balls(tmp_path: Path) -> None:
     """A box's corners are enclosed; a cylinder gets end balls; a ball is unchanged."""
     robot = odd_robot(

@@ -216,6 +216,10 @@ def welded(parent: str, name: str) -> list[str]:
           *welded("b", "tcp")], "tcp"),
         ([chain("base", "a", "b"), link("c"), joint("gripper", "b", "c"),
           *welded("b", "gripper_frame")], "gripper_frame"),
+        # Digits that are longer than the arm are no hand, either.
+        ([chain("base", "a", "b", "palm"),
+          *(chain("palm", *(f"digit_{k}{n}" for n in range(4))) for k in range(3))],
+         "palm"),
         # The wrist of a gripper belongs to the arm; a single finger is a gripper.
         ([chain("base", "a", "b"), link("c"), joint("gripper_roll", "b", "c")], "c"),
         ([chain("base", "a", "b"), link("c_gripper"), joint("c", "b", "c_gripper")],

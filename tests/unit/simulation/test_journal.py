@@ -156,8 +156,8 @@ def test_continuous_joints_are_unwound(tmp_path: Path) -> None:
     meta = {
         "format": "hsp_control rollout 1",
         "columns": {name: {"unit": "-", "meaning": ""} for name in shapes},
-        "robot": {"name": "wheel", "dofs": ["turn"], "units": ["rad"],
-                  "skeleton_parents": [-1], "continuous": [0]},
+        "robot": {"name": "wheel", "nq": 2, "nv": 1, "dofs": ["turn"],
+                  "units": ["rad"], "skeleton_parents": [-1], "continuous": [0]},
     }  # fmt: skip
     writer.write_heading(shapes, meta)
     for t, angle in zip(turning, wound, strict=True):
@@ -199,6 +199,28 @@ def test_a_damaged_end_is_reported_but_not_an_unfinished_row(
         assert read.status == "interrupted"
         assert len(read) == len(rollout)
         assert read.meta.get("damaged", 0) == damaged
+
+
+@pytest.mark.parametrize("share", [0.0, 0.25, 0.75])
+@pytest.mark.parametrize("copy", [0, 1])
+def test_the_first_heading_is_read_from_its_copy(
+    copy: int, share: float, run: tuple[Rollout, bytes], tmp_path: Path
+) -> None:
+    """Wherever a byte of one of the two changes, also in its kind and its length."""
+    rollout, data = run
+    size = 9 + int.from_bytes(data[len(MAGIC) + 1 : len(MAGIC) + 5], "little")
+    begin = len(MAGIC) + copy * size
+    for at in (begin, begin + 1, begin + 4, begin + 6, begin + 9 + int(share * size)):
+        spoilt = bytearray(data)
+        spoilt[at] ^= 4
+        path = tmp_path / "a.journal"
+        path.write_bytes(spoilt)
+        read = Rollout.load(path)
+        assert read.meta == rollout.meta
+        np.testing.assert_array_equal(read.q, rollout.q)
+    # A journal without the copy, as it once was.
+    path.write_bytes(data[: len(MAGIC)] + data[len(MAGIC) + size :])
+    assert Rollout.load(path).meta == rollout.meta
 
 
 def test_a_heading_that_is_lost_takes_its_rows_and_no_others(tmp_path: Path) -> None:
@@ -419,7 +441,7 @@ def test_ctrl_c_within_a_row_loses_none(
     if row > 0:
         assert report.ended == "operator"
         assert read.status == "interrupted"
-        assert read["live.phase"][row - 3] == Phase.RUNNING  # magic, heading, rows
+        assert read["live.phase"][row - 4] == Phase.RUNNING  # magic, headings, rows
     else:
         assert report.ended == read.status == "completed"
         assert len(read) == len(reference)

@@ -168,6 +168,19 @@ def test_a_log_with_a_wrong_byte_is_refused_or_whole(
     assert refused > 0.7 * len(places)
 
 
+def test_an_archive_marked_as_encrypted_is_refused(
+    short_log: tuple[Rollout, bytes, Path],
+) -> None:
+    """One bit of its directory says so."""
+    _, data, path = short_log
+    broken = bytearray(data)
+    end = broken.rfind(b"PK\x05\x06")
+    broken[int.from_bytes(broken[end + 16 : end + 20], "little") + 8] ^= 1
+    path.write_bytes(broken)
+    with pytest.raises(LogError, match=r"not a complete .npz log .*encrypted"):
+        Rollout.load(path)
+
+
 def npz(**arrays: Any) -> bytes:
     file = io.BytesIO()
     np.savez(file, **arrays)
@@ -217,6 +230,29 @@ FOREIGN: dict[str, tuple[Callable[[], bytes], str]] = {
     "another robot": (lambda: npz(meta=meta(robot={"nq": 9, "nv": 9}), **TWO),
                       r"the column 'q' has shape .*; needs \(2, 9\)"),
     "no column": (lambda: npz(meta=meta()), r"the log has no rows: its run ended"),
+    "columns a number": (lambda: npz(meta=meta(columns=3), **TWO),
+                         "columns is 3; needs a mapping"),
+    "an obstacle a number": (lambda: npz(meta=meta(obstacles={"a": 5}), **TWO),
+                             "obstacles: a is 5; needs a mapping"),
+    "versions a text": (lambda: npz(meta=meta(versions="x"), **TWO),
+                        "versions is 'x'; needs a mapping"),
+    "limits of another robot": (
+        lambda: npz(meta=meta(robot={"nv": 1}, limits={"lower": [1, 2]}), **TWO),
+        r"limits: lower is \[1, 2\]; needs 1 numbers or nulls"),
+    "dofs of another robot": (
+        lambda: npz(meta=meta(robot={"nv": 1, "dofs": ["a", "b"]}), **TWO),
+        r"robot: dofs is \['a', 'b'\]; needs 1 texts"),
+    "a skeleton without a point": (
+        lambda: npz(meta=meta(robot={"nv": 1, "skeleton_parents": [4]}), **TWO),
+        r"robot: skeleton_parents is \[4\]; needs numbers of points, -1 to 0"),
+    "a gain of text": (
+        lambda: npz(meta=meta(robot={"nv": 1}, null_space_gain="x"), **TWO),
+        "null_space_gain is 'x'; needs 1 x 1 numbers"),
+    "an unknown robot": (
+        lambda: npz(meta=meta(status="", robot={"name": "a"}), **TWO),
+        r"the log's robot has no 'nq' \(it has name\)"),
+    "no robot": (lambda: npz(meta=meta(status="", columns={}), **TWO),
+                 r"the log has no 'robot' \(it has format, status, columns\)"),
     "described column": (lambda: npz(meta=meta(columns={"e": {}}), **TWO),
                          r"the log lacks the column 'e'"),
 }  # fmt: skip
@@ -246,6 +282,25 @@ def test_foreign_files(which: str, tmp_path: Path) -> None:
     path = tmp_path / "foreign.npz"
     path.write_bytes(make())
     with pytest.raises(LogError, match=rf"foreign.npz: {message}"):
+        Rollout.load(path)
+
+
+@pytest.mark.parametrize(("name", "cut", "needed"), [
+    ("task.tip.reference", np.s_[:, 0], r"\(3, n\) with n of 2 or more"),
+    ("task.tip.actual", np.s_[:, :1], r"\(3, n\) with n of 2 or more"),
+    ("task.tip.bounded", np.s_[:, None], r"\(3,\)"),
+    ("singular_values", np.s_[:, 0], r"\(3, n\)"),
+    ("position_excess", np.s_[:, 0], r"\(3, 3\)"),
+])  # fmt: skip
+def test_columns_of_another_shape(
+    name: str, cut: Any, needed: str, short_log: tuple[Rollout, bytes, Path]
+) -> None:
+    run, _, path = short_log
+    columns = {"position_excess": np.zeros((3, 3)), **run.columns}
+    Rollout(columns, run.meta).save(path)
+    assert len(Rollout.load(path)) == 3
+    Rollout({**columns, name: columns[name][cut]}, run.meta).save(path)
+    with pytest.raises(LogError, match=f"{name}' has shape .*; needs {needed}$"):
         Rollout.load(path)
 
 

@@ -46,6 +46,21 @@ def test_nothing_is_odd_about_bundled_robots(name: str) -> None:
     assert inspection.loads
 
 
+def test_shapes_that_parsers_refuse_are_named(look: Look) -> None:
+    shapes = "".join(
+        f"<collision><geometry>{shape}</geometry></collision>"
+        for shape in ("", "<cone/>", "<cylinder/>", '<capsule radius="1" length="1"/>')
+    )
+    found = look(ARM.replace("</inertial>", f"</inertial>{shapes}", 1))["shape"]
+    assert {f.element for f in found} == {"link 'upper'"}
+    assert [f.message for f in found] == [
+        "a collision shape: a shape without geometry",
+        "a collision shape: <cone> is none of <box>, <cylinder>, <capsule>, <sphere>, "
+        "<mesh>",
+        "a collision shape: <cylinder> without length and radius",
+    ]
+
+
 def test_all_wrong_elements_are_listed_not_only_the_first(look: Look) -> None:
     text = ARM.replace('mass value="2"', 'mass value="two"')
     text = text.replace('xyz="0 0 1"', 'xyz="0 0 0"', 1)

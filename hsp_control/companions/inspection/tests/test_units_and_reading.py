@@ -6,8 +6,9 @@ from pathlib import Path
 
 import pytest
 from mesh_texts import tetrahedron
+from odd_robots import FACES, OCTAHEDRON, write_stl
 from robot_kinds import chain, follow
-from robot_texts import ARM, INERTIA, link
+from robot_texts import ARM, INERTIA, gripper, joint, link, robot_xml
 from wording import wording
 
 from hsp_control.companions.inspection.findings import Finding, inspect
@@ -98,6 +99,81 @@ def test_masses_in_grams(look: Look) -> None:
     assert found.element == "all links"
     assert "4000 kg move, on a chain of 0.548 m" in found.message
     assert "are these in g?" in found.cure
+
+
+BALL = '<collision><geometry><sphere radius="0.03"/></geometry></collision>'
+
+
+def test_a_link_that_is_denser_than_any_metal(look: Look) -> None:
+    heavy = arm(mass=150.0, moment=9.0)
+    assert "units" not in look(heavy)
+    found = look(heavy.replace("</inertial>", f"</inertial>{BALL}", 1))["units"]
+    assert [f.element for f in found] == ["link 'upper'"]
+    assert found[0].message.startswith("150 kg in collision shapes of 0.113 litres")
+    light = arm().replace("</inertial>", f"</inertial>{BALL}")
+    assert "units" not in look(light)
+
+
+def test_a_collision_mesh_in_another_unit(look: Look, tmp_path: Path) -> None:
+    write_stl(tmp_path / "a.stl", OCTAHEDRON, FACES)
+    mesh = '<geometry><mesh filename="a.stl" scale="{0} {0} {0}"/></geometry>'
+    for scale, expected in ((1.0, 0), (90.0, 0), (1e3, 1), (1e-3, 1)):
+        shapes = (
+            f"</inertial><visual>{mesh.format(0.01)}</visual>"
+            f"<collision>{mesh.format(0.01 * scale)}</collision>"
+        )
+        found = look(ARM.replace("</inertial>", shapes, 1)).get("units", [])
+        named = [f for f in found if "its collision mesh has a size of" in f.message]
+        assert len(named) == expected, scale
+
+
+@pytest.mark.parametrize(("old", "new", "message"), [
+    ('velocity="9"', 'velocity="180"', "its velocity limit is 180 rad/s"),
+    ('velocity="9"', 'velocity="1e6"', ""),
+    ('effort="9"', 'effort="1e9"', "its effort limit is 1e+09 N·m"),
+])  # fmt: skip
+def test_maxima_that_no_joint_reaches(
+    old: str, new: str, message: str, look: Look
+) -> None:
+    found = look(ARM.replace(old, new, 1)).get("units", [])
+    assert [(f.element, f.message) for f in found] == [
+        ("joint 'shoulder'", message)
+    ] * bool(message)
+
+
+def test_limits_of_a_continuous_joint_are_not_used(look: Look) -> None:
+    soft = (
+        '<safety_controller k_velocity="1" soft_lower_limit="-1" soft_upper_limit="1"/>'
+    )
+    parts = link("base", ""), link("upper"), joint("a", "base", "upper", "continuous")
+    found = look(robot_xml(*parts).replace("</joint>", f"{soft}</joint>"))
+    assert "its limits -3 to 3 are not used" in found["limit"][0].message
+    assert "its soft limits -1 to 1 are not" in found["soft limits"][0].message
+    without = robot_xml(*parts).replace('lower="-3" upper="3" ', "")
+    assert not {"limit", "soft limits"} & look(without).keys()
+
+
+def test_negative_damping(look: Look) -> None:
+    damped = '<dynamics damping="-3" friction="2"/></joint>'
+    (found,) = look(ARM.replace("</joint>", damped, 1))["dynamics"]
+    assert found.element == "joint 'shoulder'"
+    assert "its damping -3 is negative, as of a joint that gains energy: 3 is used" in (
+        found.message
+    )
+
+
+def test_a_safety_controller_without_its_gain_names_its_joint(look: Look) -> None:
+    soft = '<safety_controller soft_lower_limit="-1"/></joint>'
+    (found,) = look(ARM.replace("</joint>", soft, 1))["element"]
+    assert found.element == "joint 'shoulder': <safety_controller>"
+    assert found.message == "the k_velocity is missing, which parsers need"
+
+
+def test_a_misspelt_leader_is_named_with_the_nearest_joint(look: Look) -> None:
+    (found,) = look(gripper().replace('joint="shoulder"', 'joint="shoudler"'))["mimic"]
+    assert "'shoudler', which is not a moving joint; did you mean 'shoulder'?" in (
+        found.message
+    )
 
 
 def test_limits_in_degrees(look: Look) -> None:

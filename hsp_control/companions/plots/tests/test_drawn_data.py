@@ -152,6 +152,22 @@ def test_a_user_s_task_determines_its_figure() -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("rows", [slice(4, 5), slice(None)])
+def test_rows_without_a_reference_are_left_out(
+    rows: slice, logs: dict[str, Rollout]
+) -> None:
+    """The rest of a damaged log is drawn."""
+    run = logs["space"]
+    for what in ("reference", "actual"):
+        name = f"task.{measures.task_names(run)[0]}.{what}"
+        damaged = run[name].copy()
+        damaged[rows] = np.nan
+        figure = plots.paper_figure(Rollout({**run.columns, name: damaged}, run.meta))
+        limits = [(*axes.get_xlim(), *axes.get_ylim()) for axes in figure.axes]
+        assert np.isfinite(limits).all()
+
+
+@pytest.mark.slow
 def test_frames_are_equidistant_in_time_or_at_given_times(
     logs: dict[str, Rollout],
 ) -> None:

@@ -57,6 +57,16 @@ def test_logs_of_a_pattern_are_drawn_in_the_order_of_their_numbers(
 
 
 @pytest.mark.slow
+def test_logs_whose_names_are_not_utf8_are_compared(
+    logs: dict[str, hsp.Rollout], tmp_path: Path
+) -> None:
+    names = [b"caf\xe9".decode(errors="surrogateescape"), "b"]
+    files = [str(logs["rest"].save(tmp_path / f"{name}.npz")) for name in names]
+    assert plotted(*files) == ["caf\\udce9", "b"]
+    assert main(["plot", *files, "-o", str(tmp_path / "a.png")]) == 0
+
+
+@pytest.mark.slow
 def test_one_figure_goes_into_the_file_that_is_named(
     tmp_path: Path, gains: list[str], capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -33,6 +33,7 @@ from hsp_control.companions.viewer.page_plots import (
     CURVE_BOUND,
     pack_panels,
 )
+from hsp_control.companions.viewer.targets import read_targets
 
 MEGABYTE = 1e6
 PLANAR = "paper/4_moving_obstacle"
@@ -389,6 +390,37 @@ def test_the_page_needs_nothing_from_anywhere(planar: Rollout, tmp_path: Path) -
     again = export_html(planar, tmp_path / "again.html")
     assert abs(again.stat().st_size - page.stat().st_size) < 2000  # names are numbered
     assert page.stat().st_size < 0.5 * MEGABYTE
+
+
+def test_runs_of_files_whose_names_are_not_utf8_are_compared(
+    planar: Rollout, tmp_path: Path
+) -> None:
+    name = b"caf\xe9".decode(errors="surrogateescape")
+    runs = [ComparedRun(n, robot_of(planar), planar) for n in (name, "b")]
+    page = export_html(runs, tmp_path / "page.html")
+    names = content_of(page)["runs"]["names"]
+    assert names == ["caf\\udce9", "b"]
+
+
+@pytest.mark.parametrize("row", [0, 7])
+@pytest.mark.filterwarnings("error")
+def test_a_target_without_numbers_stays(
+    row: int, panda: Rollout, tmp_path: Path
+) -> None:
+    name = "task.hand.reference"
+    damaged = panda[name].copy()
+    damaged[row] = np.nan
+    log = Rollout({**panda.columns, name: damaged}, panda.meta)
+    kept = read_targets(log)[0].desired
+    assert kept is not None
+    whole = read_targets(panda)[0].desired
+    assert whole is not None
+    np.testing.assert_array_equal(kept[row], whole[row - 1 if row else 1])
+    export_html(log, tmp_path / "page.html")
+    damaged[:] = np.nan
+    log = Rollout({**panda.columns, name: damaged}, panda.meta)
+    assert read_targets(log)[0].desired is None
+    export_html(log, tmp_path / "page.html")
 
 
 def logged(rollout: Rollout) -> ComparedRun:
