@@ -100,7 +100,7 @@ def warn_of_jump(
         return
     rest = np.zeros(robot.nv)
     gravity = robot.inverse_dynamics(q, rest, rest, dynamics)
-    limit = np.where(robot.model.effortLimit > 0.0, robot.model.effortLimit, np.inf)
+    limit = robot.largest_efforts()
     share = np.abs(tau - gravity) / limit
     j = int(share.argmax())
     if not share[j] > JUMP:

@@ -120,8 +120,8 @@ class Setup:
         return _found("task", name, {each.task.name: each for each in present})
 
     def present_task(self, name: str, t: float) -> PlannedTask:
-        """Return the task of a name that is active at time t [s], or will be."""
-        for each in self.tasks:
+        """Return the newest task of a name that is active at time t [s], or will be."""
+        for each in reversed(self.tasks):
             if each.task.name == name and each.presence.at(t) > 0.0:
                 return each
         return self.task(name)

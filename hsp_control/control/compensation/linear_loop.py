@@ -374,9 +374,9 @@ def loaded_loop(
     difference = T @ np.linalg.solve(M, others) @ back
     performed = np.linalg.inv(np.eye(n) + difference)
     beta = np.linalg.eigvals(out_of @ performed[:m, :m] @ np.linalg.inv(out_of))
-    slowest = float(beta.real.min()) if m else 1.0  # without tasks the field alone
+    least = float(beta.real.min()) if m else 1.0  # without tasks the field alone
     slope = T @ np.linalg.solve(M, weight) @ back
-    return LoadedLoop(whole.loop, difference, 1.0 / slowest, slope)
+    return LoadedLoop(whole.loop, difference, 1.0 / least, slope)
 
 
 def weight_slope(robot: Robot, q: Array) -> Array:

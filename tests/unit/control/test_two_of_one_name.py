@@ -188,6 +188,14 @@ def test_commands_go_to_the_task_that_is_there() -> None:
     assert made.feedback("hand").Kp[0, 0] == 900.0
 
 
+def test_a_weight_is_that_of_the_task_that_comes() -> None:
+    """While it fades in; the older one is "hand (old)"."""
+    made = changed()
+    made.compute(0.0, ROBOT.home(), REST)
+    weights = [made.weight_of("hand", t) for t in (0.05, 0.15, 0.2, 0.4)]
+    np.testing.assert_allclose(weights, [1.0, 0.103515625, 0.5, 1.0])
+
+
 def test_a_task_that_will_be_removed_can_be_commanded() -> None:
     made = hsp.Controller(ROBOT, [point(OLD)])
     made.at(10.0).remove("hand")
