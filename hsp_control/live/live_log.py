@@ -102,7 +102,7 @@ class LoopLog:
             return
         try:
             row = self._row(phase, reader, limiter, response)
-            self._log.record(*row, tasks=not self.interrupted)
+            self._log.record(*row, parts=not self.interrupted)
         except KeyboardInterrupt:  # the row is written again
             raise
         except BaseException:

@@ -88,6 +88,7 @@ class LogWriter:
         self._made: dict[int, Change] = {}  # all changes of the run, by identity
         # the latest runs of streams, by their declarations' identities
         self._streams: dict[int, StreamRun] = {}
+        self._placed: dict[str, Array] = {}  # where the obstacles are
         self._law: StepRecord | None = None  # of the present row
         self._active: ActiveStack | None = None  # the stack of `_sources`
         self._sources: list[tuple[str, Array]] = []  # the law's arrays for columns
@@ -145,7 +146,7 @@ class LogWriter:
         log_channels: Mapping[str, LogChannel],
         *,
         keep: bool = True,
-        tasks: bool = True,
+        parts: bool = True,
     ) -> None:
         """Write a row.
 
@@ -155,7 +156,8 @@ class LogWriter:
             tau: The effort of the motors, shape (nv,).
             log_channels: Further values to log, by name.
             keep: Whether the row is written; False: see `warm_up`.
-            tasks: Whether tasks are measured: a user's may raise, again and again.
+            parts: Whether tasks and obstacles are evaluated: a user's may raise, again
+                and again. Else the obstacles are where they were in the last row.
 
         Raises:
             LogError: If the journal cannot be written.
@@ -176,20 +178,17 @@ class LogWriter:
         row["t"][...] = state.t
         row["q"][:], row["v"][:], row["tau"][:] = state.q, state.v, tau
         row["joint_positions"][:] = controller.robot.joint_positions(state.q)
-        if tasks:
+        if parts:
             self._tasks.write(state)
+            self._placed = self._place_obstacles(state.t)
         skeleton = row["skeleton"]
         joints = len(skeleton) - len(self._frames)
         skeleton[:joints] = state.world.placements[1:, 9:]
         for k, frame in self._frames:
             skeleton[k] = state.position(frame)
-        moved = controller.scene
-        for known in self._scene.values():
-            # No `get`: a scene raises its own error, not KeyError.
-            obstacle = moved[known.name] if known.name in moved else known  # noqa: SIM401
-            placement = pin.SE3ToXYZQUAT(obstacle.placement(state.t))
-            row[f"obstacle.{obstacle.name}"][:] = placement[:3]
-            row[f"obstacle.{obstacle.name}.quaternion"][:] = placement[3:]
+        for name, placement in self._placed.items():
+            row[f"obstacle.{name}"][:] = placement[:3]
+            row[f"obstacle.{name}.quaternion"][:] = placement[3:]
         if output is not None:
             self._fill_law(state, output)
         if VELOCITY not in log_channels:  # not recorded by the loop: this row alone
@@ -202,6 +201,15 @@ class LogWriter:
         if self._journal is not None:
             self._journal.write_row(columns.numbers)
         columns.keep_row()
+
+    def _place_obstacles(self, t: float) -> dict[str, Array]:
+        """Return position and quaternion of the obstacles, shape (7,), by name."""
+        moved, placed = self._controller.scene, {}
+        for known in self._scene.values():
+            # No `get`: a scene raises its own error, not KeyError.
+            obstacle = moved[known.name] if known.name in moved else known  # noqa: SIM401
+            placed[obstacle.name] = pin.SE3ToXYZQUAT(obstacle.placement(t))
+        return placed
 
     def warm_up(self, *row: Any) -> None:
         """Do everything for a row except writing it; the heading is written."""

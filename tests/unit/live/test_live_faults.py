@@ -48,6 +48,7 @@ from hsp_control.live import (
 )
 from hsp_control.live.state_reader import FrozenState, MeasurementMonitor
 from hsp_control.robot import RobotState
+from hsp_control.trajectories.trajectory import TrajectorySample
 
 RATE, EFFORT = 1000.0, 80.0
 QUICK = StopSettings(hold=0.02)
@@ -465,20 +466,38 @@ def test_an_exception_of_a_field_ends_in_the_safe_stop(
 
 
 @pytest.mark.parametrize(
-    "error", [SystemExit(3), *further(KeyboardInterrupt(), *NO_EXCEPTIONS)], ids=repr
+    ("error", "where"),
+    [
+        *((KeyboardInterrupt(), "task"), (SystemExit(3), "obstacle")),
+        *further(*itertools.product(NO_EXCEPTIONS, ["task", "obstacle"])),
+    ],
+    ids=repr,
 )
-def test_an_exception_that_a_task_keeps_raising_ends_in_the_safe_stop(
-    error: BaseException, tmp_path: Path
+def test_an_exception_that_a_part_keeps_raising_ends_in_the_safe_stop(
+    error: BaseException, where: str, tmp_path: Path
 ) -> None:
-    """Rows of the log measure tasks in the stop, too: that is no second Ctrl-C."""
+    """Rows of the log evaluate parts in the stop, too: that is no second Ctrl-C."""
 
     def height(state: RobotState) -> float:
-        if state.t > 0.05:
+        if where == "task" and state.t > 0.05:
             raise error
         return float(state.position("panda_tcp")[2])
 
+    class Center(hsp.trajectories.Trajectory):
+        dimension = 3
+
+        def sample(
+            self, t: float, out: TrajectorySample | None = None
+        ) -> TrajectorySample:
+            if where == "obstacle" and t > 0.05:
+                raise error
+            return hsp.Hold([0.6, 0.5, 0.5]).sample(t, out)
+
     log, robot = tmp_path / "run.journal", rig()
-    made = hsp.Controller(panda(), [hsp.FunctionTask(height)], hsp.JointCentering())
+    ball = hsp.Obstacle("ball", hsp.shapes.Sphere(0.05), Center())
+    field = hsp.JointCentering() + hsp.ObstacleClearance(["ball"])
+    task = hsp.FunctionTask(height)
+    made = hsp.Controller(panda(), [task], field, scene=[ball])
     report = run_loop(made, robot, duration=0.3, settings=SETTINGS, log=log)
     assert_safe(robot, report)
     assert not report.silent
