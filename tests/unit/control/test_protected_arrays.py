@@ -524,10 +524,13 @@ def test_a_lock_that_is_held_around_a_step_is_free_in_a_forked_process() -> None
     thread.start()
     assert held.wait(60.0)
     lock.forked()
-    with lock:
-        pass
+    free = lock._lock.acquire(blocking=False)
     leave.set()
     thread.join()
+    assert free
+    lock._lock.release()
+    with lock:
+        pass
 
 
 def test_a_lock_that_this_thread_holds_is_kept_in_a_forked_process() -> None:
