@@ -9,6 +9,7 @@ import hsp_control as hsp
 from hsp_control.cli import main
 from hsp_control.common.exceptions import ConfigError
 from hsp_control.null_space.metrics import IdentityMetric, MassMatrixMetric, Metric
+from hsp_control.simulation.plants.model_changes import Inertias, changed
 
 GAIN = 4.0
 V0 = np.array([0.3, -0.2, 0.4, 0.1, -0.5, 0.2, 0.6])
@@ -69,10 +70,7 @@ def test_its_held_loop_is_checked_for_other_masses() -> None:
     """The field alone: there is no error whose acceleration would be less."""
     robot = hsp.Robot.load("panda")
     controller = hsp.Controller(robot, [], hsp.TargetPosture(robot.home()))
-    model = robot.model.copy()
-    for inertia in list(model.inertias)[1:]:
-        inertia.mass *= 1.2
-    heavy = hsp.plants.RigidBodyPlant(hsp.Robot.from_pinocchio(model))
+    heavy = hsp.plants.RigidBodyPlant(changed(robot, [Inertias(1.2)]))
     run = hsp.simulate(
         controller, robot.home(), duration=0.05, control_period=1e-3, plant=heavy
     )

@@ -23,6 +23,7 @@ from hsp_control.live import (
 )
 from hsp_control.robot.integrators import SemiImplicitEuler
 from hsp_control.simulation.plants import IntegratedPlant, RigidBodyPlant
+from hsp_control.simulation.plants.model_changes import Inertias, changed
 
 PERIOD = 0.002
 KNOWN = 500
@@ -40,17 +41,13 @@ class Blind(Rig):
 
     def __init__(self, arm: str, share: float, *, silent: bool) -> None:
         known = load(arm)
-        model = known.model.copy()
-        for inertia in list(model.inertias)[1:]:  # not on a slice, which is a copy
-            inertia.mass *= share
-            inertia.inertia = inertia.inertia * share
-        true = RigidBodyPlant(hsp.Robot.from_pinocchio(model))
+        true = RigidBodyPlant(changed(known, [Inertias(share)]))
         plant = IntegratedPlant(true, SemiImplicitEuler(PERIOD))
         q, v = known.home(), np.zeros(known.nv)
         super().__init__(SimulatedRobot(plant, q, v, PERIOD, settings=PATIENT))
         self.silent, self.fastest = silent, 0.0
         both = np.ones(known.nv, dtype=bool), KNOWN, np.random.default_rng(0), PERIOD
-        self.jump = partial(Sensors(*both).__call__, lie=LIES["both: +1 and +0.1"])
+        self.jump = partial(Sensors(*both), lie=LIES["both: +1 and +0.1"])
 
     def read(self, timeout: float) -> Measurement | None:
         found = super().read(timeout)
