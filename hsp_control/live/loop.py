@@ -315,13 +315,17 @@ class LiveRun:
         self.feel_ground()
         self.check_applied_effort()
         tau = self.controller_effort() if self.phase == Phase.RUNNING else None
-        if self.phase != Phase.RUNNING:
+        stops = self.phase != Phase.RUNNING
+        if stops:
             tau = self.stop_effort()
+        elif reader.blind:
+            tau = self.safe_stop.effort(reader.state)
+        elif reader.measurement is not None:
+            self.safe_stop.begin()  # anew when states are missing again
         limiter.follow(self.chain.compensated.controller.limits)
         before = limiter.sent.copy()
-        # The stop must brake all joints at once; the law's effort is sent unchanged.
-        stops = self.phase != Phase.RUNNING
-        inertia = reader.state.mass_matrix if stops else None
+        # A stop must brake all joints at once; the law's effort is sent unchanged.
+        inertia = reader.state.mass_matrix if stops or reader.blind else None
         if tau is not None and not limiter.apply(tau, reader.state.q, inertia):
             self.stop("fault", f"the effort is not finite: {tau.tolist()}")
         self.send(before)

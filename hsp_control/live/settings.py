@@ -79,8 +79,9 @@ class LiveSettings(Part, error=LiveError):
     """Maximum effort of the motors, gravity included [N·m or N], one number or nv; by
     default that of the controller's limits, or the URDF's without limits."""
     missing: Count = 20
-    """Consecutive periods without a new state before the safe stop [periods]; the last
-    effort is held meanwhile."""
+    """Consecutive periods without a new state before the safe stop [periods]. The last
+    effort is held for the first 10 ms, or two of them; then the robot brakes, and the
+    law goes on with the next state."""
     age: Positive = 0.02
     """Maximum age of a state [s]."""
     prediction_time: NonNegative = 0.2

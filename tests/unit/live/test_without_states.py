@@ -89,3 +89,37 @@ def test_predictions_before_a_late_state_are_discarded() -> None:
     report = run_loop(law(), Rig(watched(), lost), duration=0.1, settings=settings)
     assert report.ended == "completed", report.reason
     assert not report.silent
+
+
+def test_an_effort_is_held_for_ten_milliseconds_then_the_robot_brakes() -> None:
+    """Until states arrive again; then the law goes on."""
+    lost, held = 18, 10
+    rig = Rig(watched(), dict.fromkeys(range(80, 80 + lost), missing))
+    speeds = list[float]()
+    report = run_loop(
+        law(),
+        rig,
+        duration=0.2,
+        on_period=lambda _: speeds.append(float(np.abs(rig.robot.v).max())),
+    )
+    assert report.ended == "completed", report.reason
+    sent = np.array(rig.sent)
+    changes = np.abs(np.diff(sent, axis=0)).max(axis=1)
+    still = np.flatnonzero(changes[:150] == 0.0)
+    assert still.size == held
+    assert np.ptp(still) == held - 1
+    begin = int(still[-1]) + 2  # of braking
+    end = begin + lost - held
+    expected = np.exp(-StopSettings().damping * (lost - held) * PERIOD)
+    assert speeds[end] / speeds[begin] == pytest.approx(expected, rel=0.02)
+    assert speeds[-1] > speeds[end]
+
+
+def test_an_effort_is_held_over_two_lost_states_of_a_long_period() -> None:
+    """At 10 ms, too: often two of them are lost in a row on a bad line."""
+    lost = {read for read in range(10, 90) if read % 10 < 2}
+    rig = Rig(watched(period=0.01), dict.fromkeys(lost, missing))
+    report = run_loop(law(), rig, duration=1.0)
+    assert report.ended == "completed", report.reason
+    held = np.flatnonzero((np.diff(rig.sent, axis=0) == 0.0).all(axis=1)) + 3
+    assert lost == {read for read in held.tolist() if read < 90}

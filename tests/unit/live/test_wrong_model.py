@@ -25,10 +25,9 @@ from hsp_control.robot.integrators import SemiImplicitEuler
 from hsp_control.simulation.plants import IntegratedPlant, RigidBodyPlant
 from hsp_control.simulation.plants.model_changes import Inertias, changed
 
-PERIOD = 0.002
-KNOWN = 500
-"""Number of the read after which the fault begins: 3 % of the load were not known yet
-0.2 s before."""
+KNOWN = 1.0
+"""Time after which the fault begins [s]: 3 % of the load were not known yet 0.2 s
+before."""
 SETTINGS = LiveSettings(
     effort_rate=1000.0, stop=StopSettings(hold=0.02, longest_damping=0.3)
 )
@@ -39,23 +38,33 @@ PATIENT = LiveSettings(velocity_margin=99.0)
 class Blind(Rig):
     """A robot at rest whose masses differ, and which is not measured any more."""
 
-    def __init__(self, arm: str, share: float, *, silent: bool) -> None:
+    def __init__(
+        self, arm: str, share: float, *, silent: bool, period: float = 0.002
+    ) -> None:
         known = load(arm)
         true = RigidBodyPlant(changed(known, [Inertias(share)]))
-        plant = IntegratedPlant(true, SemiImplicitEuler(PERIOD))
+        plant = IntegratedPlant(true, SemiImplicitEuler(period))
         q, v = known.home(), np.zeros(known.nv)
-        super().__init__(SimulatedRobot(plant, q, v, PERIOD, settings=PATIENT))
-        self.silent, self.fastest = silent, 0.0
-        both = np.ones(known.nv, dtype=bool), KNOWN, np.random.default_rng(0), PERIOD
+        super().__init__(SimulatedRobot(plant, q, v, period, settings=PATIENT))
+        self.silent, self.fastest, self.good = silent, 0.0, round(KNOWN / period)
+        every = np.ones(known.nv, dtype=bool)
+        both = every, self.good, np.random.default_rng(0), period
         self.jump = partial(Sensors(*both), lie=LIES["both: +1 and +0.1"])
 
     def read(self, timeout: float) -> Measurement | None:
         found = super().read(timeout)
         assert found is not None
-        if self.reads < KNOWN:
+        if self.reads < self.good:
             return self.jump(found)
         self.fastest = max(self.fastest, float(np.abs(found.v).max()))
         return None if self.silent else self.jump(found)
+
+
+def at_rest(arm: str, metric: hsp.metrics.Metric | None = None) -> hsp.Controller:
+    own = load(arm)
+    tip = own.state(0.0, own.home(), np.zeros(own.nv)).position(own.hand.frame)
+    task = hsp.FramePosition(own.hand.frame, tip)
+    return hsp.Controller(own, [task], hsp.TargetPosture(own.home()), metric=metric)
 
 
 @pytest.mark.parametrize(
@@ -73,11 +82,17 @@ def test_an_arm_of_other_masses_that_is_not_measured_stays_at_rest(
     arm: str, share: float, silent: bool
 ) -> None:
     """All joints are lost at once: they jump, or there is no state any more."""
-    robot, own = Blind(arm, share, silent=silent), load(arm)
-    tip = own.state(0.0, own.home(), np.zeros(own.nv)).position(own.hand.frame)
-    task = hsp.FramePosition(own.hand.frame, tip)
-    law = hsp.Controller(own, [task], hsp.TargetPosture(own.home()))
-    report = run_loop(law, robot, duration=2.0, settings=SETTINGS)
+    robot = Blind(arm, share, silent=silent)
+    report = run_loop(at_rest(arm), robot, duration=2.0, settings=SETTINGS)
     assert report.ended == "fault"
     assert ("no new state" if silent else "jumps by") in report.reason
+    assert robot.fastest < 0.3
+
+
+def test_the_effort_that_is_held_in_a_silence_does_not_drive_an_arm() -> None:
+    """Over W = M(q) this light wrist gained 0.46 rad/s within twenty periods."""
+    robot = Blind("xarm7", 1.2, silent=True, period=0.001)
+    law = at_rest("xarm7", hsp.metrics.MassMatrixMetric())
+    report = run_loop(law, robot, duration=2.0, settings=SETTINGS)
+    assert "no new state" in report.reason
     assert robot.fastest < 0.3
