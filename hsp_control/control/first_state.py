@@ -30,7 +30,10 @@ REST = 0.05
 
 
 class StartWarning(UserWarning):
-    """A run would begin with a jump of an effort, or with too slow efforts."""
+    """A run would begin with a jump of an effort, or with too slow efforts.
+
+    Or a task that a change adds begins without what is declared for all of them.
+    """
 
 
 def check_angles(robot: Robot, q: Array) -> None:

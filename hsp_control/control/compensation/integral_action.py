@@ -1,7 +1,6 @@
 """Integral action: e'' + Kv e' + Kp e + Ki ∫e = 0."""
 
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import KW_ONLY, field
 from typing import Annotated
 
@@ -11,9 +10,11 @@ from hsp_control import engine
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.exceptions import CompensationError, GainError
 from hsp_control.common.suggestions import did_you_mean, listing
+from hsp_control.common.warned import warn
 from hsp_control.control.actuation import Status
 from hsp_control.control.compensation.stage import Alone, AloneCalls, Run, Stage
 from hsp_control.control.controller import Controller
+from hsp_control.control.first_state import StartWarning
 from hsp_control.control.measurement import LogChannel
 from hsp_control.control.planned import PlannedTask
 from hsp_control.control.task_names import TaskNames
@@ -108,7 +109,8 @@ class RunningIntegral(Stage):
     """Integral action in one run: it keeps the integrals.
 
     By the keys of tasks, of which two may have one name while they fade. A task that a
-    change adds has integral action, too, where its error equation permits.
+    change adds has integral action, too; where its error equation permits none, a
+    warning says so.
 
     Attributes:
         integrals: ∫e by task, shape (m,) [m·s or rad·s].
@@ -137,8 +139,7 @@ class RunningIntegral(Stage):
         for key, each in present.items():
             self._gains[key] = before.get(key)
             if key not in before:
-                with suppress(CompensationError, GainError):
-                    self._gains[key] = self._declared.gain(each.task)
+                self._gains[key] = self._gain_of_new(each.task)
         self.integrals = {
             key: self.integrals.get(key, np.zeros(len(Ki)))
             for key, Ki in self._gains.items()
@@ -147,6 +148,16 @@ class RunningIntegral(Stage):
         bound = self._bound or {}
         self._bound = {key: bound[key] for key in bound if key in self.integrals}
         return present
+
+    def _gain_of_new(self, task: Task) -> Array | None:
+        """Return Ki; None, with a warning, if its error equation permits none."""
+        try:
+            return self._declared.gain(task)
+        except (CompensationError, GainError) as error:
+            name = f"task {task.name!r}"
+            why = str(error).removeprefix(f"{name} ")
+            warn(f"{name} begins without integral action: {why}", StartWarning)
+            return None
 
     def finish(self, run: Run) -> None:
         """Integrate the errors of the fully active tasks; see `Stage.finish`."""

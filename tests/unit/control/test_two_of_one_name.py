@@ -14,6 +14,7 @@ from hsp_control.control.compensation import (
     IntegralAction,
     MomentumObserver,
 )
+from hsp_control.control.interface import StartWarning
 from hsp_control.tasks.impedance import parts_of
 
 H = 1e-3
@@ -148,6 +149,27 @@ def test_each_has_its_integral() -> None:
         assert np.isnan(old[-1]).all()
 
 
+def efforts(compensated: CompensatedController) -> None:
+    """Compute a hundred efforts, but for the first one."""
+    for k in range(1, 100):
+        compensated.effort(k * H, ROBOT.home(), REST, H)
+
+
+def test_an_added_task_without_integral_action_is_named() -> None:
+    """Integral action would make its error grow."""
+    made = hsp.Controller(ROBOT, [point(OLD)], limits=None)
+    own = Compensation(momentum_observer=None, integral_action=IntegralAction(2.0))
+    compensated = CompensatedController(made, own)
+    compensated.effort(0.0, ROBOT.home(), REST, H)
+    turn = hsp.FrameOrientation("panda_tcp", gains=hsp.Gains(kp=2.0, kv=0.1), name="t")
+    made.at(0.0).add(turn)
+    with pytest.warns(StartWarning, match="task 't' begins without integral") as found:
+        efforts(compensated)
+    assert len(found) == 1
+    assert "Ki must be below" in str(found[0].message)
+    assert found[0].filename == __file__
+
+
 def test_a_task_is_integrated_where_another_one_is_removed() -> None:
     made = hsp.Controller(
         ROBOT,
@@ -159,8 +181,7 @@ def test_a_task_is_integrated_where_another_one_is_removed() -> None:
     compensated = CompensatedController(made, own)
     compensated.effort(0.0, ROBOT.home(), REST, H)
     made.at(0.0).ramp(0.05).remove("turn")
-    for k in range(1, 100):
-        compensated.effort(k * H, ROBOT.home(), REST, H)
+    efforts(compensated)
     e = compensated.output.error("hand")
     channel = compensated.log_channels()["task.hand.integral"]
     np.testing.assert_allclose(channel.value, 100 * H * e, rtol=1e-9)
