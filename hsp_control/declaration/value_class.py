@@ -19,6 +19,7 @@ from hsp_control.declaration.in_python import (
     with_parts_made,
 )
 from hsp_control.declaration.mistakes import Carrier, argument_error
+from hsp_control.declaration.overrides import check_overrides
 
 _CONFIG = ConfigDict(
     extra="forbid",
@@ -59,6 +60,7 @@ class ValueClass(ABCMeta):
                 f"{name} must not have __init__: declare its parameters as fields, and "
                 "check them in __post_init__"
             )
+        check_overrides(cls, namespace)
         if error is not None:
             cls.error = error
         if family is not None:
