@@ -18,7 +18,8 @@ _EVIDENT = 0.05
 class FaultIsolation:
     """Isolates the wrong source of joints whose velocity contradicts their positions.
 
-    The wrong one deviates more from the model's expectation. A fault often affects the
+    The wrong one deviates more from the model's expectation, if one deviates at all:
+    slow drifts of a velocity are expected as they come. A fault often affects the
     sensors of several joints: once one kind of source was wrong beyond doubt, and not
     the other kind, it is wrong in joints in doubt, too, also in those of which neither
     was trusted. Unless a kind is known, the joints in doubt are decided together: none,
@@ -51,7 +52,7 @@ class FaultIsolation:
             slight: Whether a joint's sources are little different, shape (nv,).
         """
         greatest = surprise.max(axis=0)
-        right = surprise < _CLEARLY * greatest
+        right = (surprise < _CLEARLY * greatest) & (greatest > _EVIDENT)
         known = self._wrong_kind[0] != self._wrong_kind[1]
         clear = surprise < (_OTHERWISE if known else _BEYOND_DOUBT) * greatest
         clear &= greatest > _EVIDENT

@@ -8,8 +8,10 @@ makes the same step.
 
 import gc
 import pickle
-from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
+from itertools import repeat
+from multiprocessing import get_context
 
 import numpy as np
 import psutil
@@ -102,26 +104,29 @@ class Repeated:
 KINDS = (*CHANGES, "target", "twist")
 
 
-def run(kind: str, number: int) -> Iterator[tuple[int, str]]:
-    """Make changes of a kind; yield their number, and finally the growth."""
+def grown(kind: str, number: int) -> str:
+    """Make changes of a kind; return what grew, empty if nothing."""
     repeated, some = Repeated(kind), RECORDED if kind in ("target", "twist") else FEW
     for j in range(some):
         repeated.change(j)
-    few, number = repeated.kept(), max(number, 2 * some)
-    for j in range(some, 2 * (number // 2)):
+    few = repeated.kept()
+    for j in range(some, 2 * (max(number, 2 * some) // 2)):
         repeated.change(j)
-        if j % 100 == 0:
-            yield j, ""
-    yield number, repeated.kept().grew_from(few)
+    return repeated.kept().grew_from(few)
 
 
 def campaign(progress: Progress, seed: int, share: float) -> bool:
-    """Make all changes of each kind."""
+    """Make all changes of each kind.
+
+    In a process of its own: the memory that another kind has freed may be filled again.
+    """
     number, found = max(2 * FEW, round(share * NUMBER)), dict[str, str]()
-    for kind in KINDS:
-        bar = progress.add_task(f"changes {kind}", total=number)
-        for done, grew in run(kind, number):
-            progress.update(bar, completed=done)
+    bar = progress.add_task("changes", total=len(KINDS))
+    fresh = get_context("spawn")
+    with ProcessPoolExecutor(1, mp_context=fresh, max_tasks_per_child=1) as processes:
+        each = processes.map(grown, KINDS, repeat(number))
+        for kind, grew in zip(KINDS, each, strict=True):
             found[kind] = grew
-        keep("changes", {"number": number, "wanted": NUMBER, "grew": found})
+            progress.advance(bar)
+            keep("changes", {"number": number, "wanted": NUMBER, "grew": found})
     return not any(found.values())
