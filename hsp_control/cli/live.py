@@ -34,7 +34,7 @@ from hsp_control.live import (
     publish,
     run_loop,
 )
-from hsp_control.live.hardware import AdaptingHardware, LocatedHardware
+from hsp_control.live.hardware import AdaptingHardware, LocatedHardware, described
 from hsp_control.live.operator_requests import stop_signals
 from hsp_control.simulation import Rollout
 from hsp_control.simulation.declared_run import with_duration
@@ -100,7 +100,7 @@ def live(options: argparse.Namespace) -> int:
                 **options_of_loop,
             )
             if publisher is not None:
-                publisher.ended(report.ended, report.reason)
+                _publish_end(publisher, report)
             return report
 
         # A dry run binds everything, before there is a clock
@@ -167,6 +167,14 @@ def live(options: argparse.Namespace) -> int:
     if not regular:
         print(f"hsp: {report.reason}", file=sys.stderr)
     return 0 if regular and robot_report is not None and kept else 2
+
+
+def _publish_end(publisher: Publisher, report: LoopReport) -> None:
+    """Publish the end; what a publisher raises hides neither it nor the log."""
+    try:
+        publisher.ended(report.ended, report.reason)
+    except BaseException as error:
+        print(f"hsp: the end was not published: {described(error)}", file=sys.stderr)
 
 
 def _compensated(experiment: Experiment, *, real: bool) -> CompensatedController:

@@ -1,15 +1,15 @@
 """The interface of a robot: required and optional methods, and its connection."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from importlib.metadata import EntryPoint
 from typing import Protocol, runtime_checkable
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.entry_points import entry_points
-from hsp_control.common.exceptions import HspControlError, LiveError
+from hsp_control.common.exceptions import HardwareError, HspControlError, LiveError
 from hsp_control.common.suggestions import listing, nearest
 from hsp_control.control.measurement import Measurement as Measurement
-from hsp_control.live.operator_requests import OPERATOR
 from hsp_control.live.settings import LiveSettings
 from hsp_control.robot import Robot
 from hsp_control.simulation.control_chain import EffortSource
@@ -66,9 +66,7 @@ def described(error: BaseException) -> str:
     name = type(error).__name__
     try:
         message = str(error)
-    except OPERATOR:
-        raise
-    except BaseException:
+    except BaseException:  # also SystemExit: who describes an error goes on
         return name
     if isinstance(error, HspControlError | OSError) and message:
         return message
@@ -111,9 +109,10 @@ def connect(url: str, robot: Robot, period: float) -> Hardware:
         LiveError: If no package provides the name.
         HardwareError: If the robot cannot be reached.
     """
-    address, known = installed("--robot", url, "hardware")
-    make: Callable[[str, Robot, float], Hardware] = known.load()
-    return make(address, robot, period)
+    with _foreign("--robot", url):
+        address, known = installed("--robot", url, "hardware")
+        make: Callable[[str, Robot, float], Hardware] = known.load()
+        return make(address, robot, period)
 
 
 class Publisher(Protocol):
@@ -137,9 +136,21 @@ def publish(url: str, source: EffortSource) -> Publisher:
         LiveError: If no package provides the name.
         HardwareError: If the address is wrong, or something is not installed.
     """
-    address, known = installed("--publish", url, "publishers")
-    make: Callable[[str, EffortSource], Publisher] = known.load()
-    return make(address, source)
+    with _foreign("--publish", url):
+        address, known = installed("--publish", url, "publishers")
+        make: Callable[[str, EffortSource], Publisher] = known.load()
+        return make(address, source)
+
+
+@contextmanager
+def _foreign(option: str, url: str) -> Iterator[None]:
+    """Name the option whose package raises."""
+    try:
+        yield
+    except HspControlError:
+        raise
+    except Exception as error:
+        raise HardwareError(f"{option} {url!r}: {described(error)}") from error
 
 
 def installed(option: str, url: str, group: str) -> tuple[str, EntryPoint]:

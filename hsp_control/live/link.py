@@ -133,6 +133,8 @@ class Faults:
             raise LiveError("the probabilities of the faults add up to more than 1")
         if self.delay < 1:
             raise LiveError(f"delay is {self.delay}; needs at least 1 packet")
+        if self.seed < 0:
+            raise LiveError(f"seed is {self.seed}; must not be negative")
 
     @classmethod
     def parse(cls, text: str) -> "Faults":
@@ -150,13 +152,13 @@ class Faults:
                     f"no fault {name!r}{did_you_mean(name, known)} "
                     f"(there are {', '.join(known)})"
                 )
+            whole = name in {"delay", "seed"}
             try:
-                kind = int if name in {"delay", "seed"} else float
-                values[name] = kind(number)
+                values[name] = int(number) if whole else float(number)
             except ValueError:
-                raise LiveError(
-                    f"fault {name} is {number!r}; needs a number, as {name}=0.01"
-                ) from None
+                needs = "an integer" if whole else "a number"
+                needs += f", as {name}={3 if whole else 0.01}"
+                raise LiveError(f"fault {name} is {number!r}; needs {needs}") from None
         return cls(**values)  # type: ignore[arg-type]
 
     def as_json(self) -> dict[str, float]:

@@ -7,12 +7,15 @@ simulation only copies its state. Without a graphics card Mesa draws.
 import ctypes
 import multiprocessing
 import os
+import sys
 from collections.abc import Callable
+from contextlib import suppress
 from http.server import BaseHTTPRequestHandler, HTTPServer
 from io import BytesIO
 from multiprocessing.connection import Connection
 from multiprocessing.util import Finalize
-from threading import Thread
+from socket import SHUT_RDWR
+from threading import Thread, Timer
 from time import monotonic
 from typing import Any
 from urllib.parse import parse_qsl, unquote, urlsplit
@@ -37,6 +40,8 @@ _LARGEST = 2048
 """Maximum width and height [pixels]."""
 _SIZES = 4
 """Number of picture sizes whose renderers are kept."""
+_REQUEST = 2.0
+"""Maximum duration in which a request arrives [s]."""
 _PATIENCE = 60.0
 """Maximum time until the first picture can be drawn [s]."""
 _HANGS = 20.0
@@ -209,15 +214,37 @@ class _Drawer(HTTPServer):
         """Report that it is alive: twice a second, and after each request."""
         self.alive.value += 1
 
+    def handle_error(self, request: Any, client_address: Any) -> None:
+        """Ignore a client that has gone before it had its picture."""
+        if not isinstance(sys.exc_info()[1], OSError):
+            super().handle_error(request, client_address)
+
 
 class _Handler(BaseHTTPRequestHandler):
     """Answers one request."""
 
     server: _Drawer
-    timeout = 1.0  # of a client that sends no request [s]
+    timeout = 1.0  # of a client that sends or reads nothing [s]
+
+    def setup(self) -> None:
+        """Begin with a request, which must arrive in time, however its parts do."""
+        super().setup()
+        self._late = Timer(_REQUEST, self._hang_up)
+        self._late.daemon = True
+        self._late.start()
+
+    def finish(self) -> None:
+        """End the connection."""
+        self._late.cancel()
+        super().finish()
+
+    def _hang_up(self) -> None:
+        with suppress(OSError):
+            self.connection.shutdown(SHUT_RDWR)
 
     def do_GET(self) -> None:
         """Send a picture, or list the cameras."""
+        self._late.cancel()
         try:
             camera, ending, size = _asked(self.path, self.server.pictures.cameras)
         except ValueError as error:

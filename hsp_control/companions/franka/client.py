@@ -237,7 +237,9 @@ class GripperClient:
         """Print a line once."""
         if line != self.last_line:
             self.last_line = line
-            print(f"The gripper: {line}", flush=True)
+            shown = line.encode("ascii", "backslashreplace").decode()
+            with suppress(OSError, ValueError):  # the standard output may be closed
+                print(f"The gripper: {shown}", flush=True)
 
 
 def is_answer(text: bytes) -> bool:

@@ -18,6 +18,8 @@ from hsp_control.companions.franka import client
 from hsp_control.companions.franka.reflexes import explained
 
 INSTALL = "pip install 'hsp_control[franka]'"
+_AT_ONCE = 10
+"""Maximum number of its messages that are read in a period."""
 _HANGS = 5.0
 """Silence after which a process is treated as hanging [s]: a motion of the fingers,
 during which it is silent, takes less than two."""
@@ -110,7 +112,9 @@ class ClientProcess:
         Without requests it reports periodically that it is alive.
         """
         received = False
-        while select([self._link], [], [], 0.0)[0]:
+        for _ in range(_AT_ONCE):
+            if not select([self._link], [], [], 0.0)[0]:
+                break
             try:
                 said = self._link.recv(client.LONGEST)
             except OSError:

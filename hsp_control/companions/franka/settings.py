@@ -11,7 +11,7 @@ from pydantic import Field
 
 from hsp_control.common.exceptions import LiveError
 from hsp_control.companions.shared import name_and_options
-from hsp_control.declaration import Part
+from hsp_control.declaration import Part, within
 from hsp_control.declaration.quantities import (
     ArrayField,
     Flag,
@@ -102,6 +102,13 @@ class FrankaSettings(Part, error=LiveError):
     """Cutoff of a first-order filter between loop and robot [Hz]; None: no filter."""
     gripper: Annotated[str, Field(pattern=r"^udp://[^/:]+:\d+$")] | None = None
     """Address that receives openings of a finger, ``udp://HOST:PORT``; None: none."""
+
+    def __post_init__(self) -> None:
+        """Check the gripper's port."""
+        port = int((self.gripper or "udp://host:1").rpartition(":")[2])
+        if not 1 <= port <= 65535:
+            with within("gripper"):
+                raise LiveError(f"port {port} is not between 1 and 65535")
 
     @classmethod
     def parse(cls, text: str) -> Self:

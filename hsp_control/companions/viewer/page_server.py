@@ -35,6 +35,7 @@ from hsp_control.companions.viewer.commands import (
 _LARGE = 100_000  # bytes of a message from which on it is compressed: meshes
 _MAX_SIZE = 1_000_000  # bytes; the commands that move a robot are far smaller
 _LONGEST = 4000  # maximum size of a page's message [bytes]
+_LONGEST_REASON = 120  # of a disconnection [bytes]
 
 
 def batch_messages(commands: list[bytes]) -> list[bytes]:
@@ -214,7 +215,8 @@ class Page(WebSocketHandler):
             else:
                 self.answered = max(self.answered, int(message))
         except ValueError as error:
-            self.close(1008, str(error))
+            reason = str(error).encode()[:_LONGEST_REASON].decode(errors="ignore")
+            self.close(1008, reason)
         except BaseException:
             self._leave()
             raise
@@ -253,8 +255,10 @@ class Page(WebSocketHandler):
 
     def _leave(self) -> None:
         """Remove the page where Tornado would not, and disconnect it."""
-        self.on_close()
-        self.hang_up()
+        try:
+            self.on_close()
+        finally:
+            self.hang_up()
 
     def ask(self) -> None:
         """Request that the page returns a number once it shows everything sent."""

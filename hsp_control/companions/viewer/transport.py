@@ -13,6 +13,7 @@ import webbrowser
 from collections.abc import Iterable
 from contextlib import suppress
 from html import escape
+from ipaddress import ip_address
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +22,7 @@ from hsp_control.companions.viewer.commands import (
     LatestCommands,
     PageCommand,
 )
+from hsp_control.live.hardware import described
 
 
 class SceneRecorder:
@@ -139,6 +141,7 @@ class PageServer(SceneRecorder):
                 f"host {host!r} is every address of this computer; give the one at "
                 "which the page is opened, such as 192.168.1.20"
             )
+        check_unicast(host)
         super().__init__()
         self._hub = Hub(self.scene, steerable=steerable)
         door, meshcat = Door(host, page_key(host, fresh=fresh)), meshcat_page()
@@ -195,8 +198,26 @@ class PageServer(SceneRecorder):
         if self._closed:
             raise ViewerError("the viewer is closed")
         if (failure := self._thread.failure) is not None:
-            name, text = type(failure).__name__, str(failure)
-            raise ViewerError(f"the page's server has failed: {name} {text}".strip())
+            raise ViewerError(f"the page's server has failed: {described(failure)}")
+
+
+def check_unicast(host: str) -> None:
+    """Check that an address, if it is no name, can be one computer's, and is IPv4's.
+
+    Raises:
+        ViewerError: If it is none of these.
+    """
+    try:
+        address = ip_address(host)
+    except ValueError:  # a name
+        return
+    if address.version != 4:
+        raise ViewerError(f"host {host!r} is an IPv6 address; give an IPv4 address")
+    if address.is_multicast or address.is_reserved:
+        raise ViewerError(
+            f"host {host!r} is the address of many computers; give the one of this "
+            "computer at which the page is opened, such as 192.168.1.20"
+        )
 
 
 def page_key(host: str, *, fresh: bool = False) -> str:

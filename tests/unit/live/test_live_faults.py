@@ -419,6 +419,24 @@ def test_a_base_exception_is_a_fault(where: str, error: BaseException) -> None:
     test_any_exception.hypothesis.inner_test(where, error, 1)  # type: ignore[attr-defined]
 
 
+class Speechless(Exception):
+    """Its message raises."""
+
+    def __init__(self, raised: BaseException) -> None:
+        self.raised = raised
+
+    def __str__(self) -> str:
+        raise self.raised
+
+
+@pytest.mark.parametrize("raised", [SystemExit(0), KeyboardInterrupt()], ids=repr)
+@pytest.mark.parametrize("where", ["read", "write", "close", "on_period"])
+def test_an_error_whose_message_raises_is_a_fault(
+    where: str, raised: BaseException
+) -> None:
+    test_a_base_exception_is_a_fault(where, Speechless(raised))
+
+
 @pytest.mark.parametrize(
     ("error", "once"),
     covering(

@@ -113,7 +113,8 @@ def test_faults_are_parsed_and_refused() -> None:
     for text, message in (
         ("loss=0.1", "no fault 'loss'; did you mean 'lost'"),
         ("lost", "fault lost is ''; needs a number"),
-        ("seed=0.5", "fault seed is '0.5'"),
+        ("seed=0.5", "fault seed is '0.5'; needs an integer, as seed=3"),
+        ("seed=-1", "seed is -1; must not be negative"),
         ("lost=1.5", "lost is 1.5; needs a probability"),
         ("lost=0.6,late=0.6", "add up to more than 1"),
         ("delay=0", "delay is 0"),

@@ -44,6 +44,33 @@ def test_nothing_else_moves_the_fingers(message: Any) -> None:
         gripper().read(message, SENDER, 0.01)
 
 
+class Closed:
+    """A standard output that nobody reads."""
+
+    encoding = "ascii"
+
+    def write(self, text: str) -> int:
+        text.encode("ascii")
+        raise BrokenPipeError
+
+    def flush(self) -> None:
+        raise BrokenPipeError
+
+
+@pytest.mark.parametrize("closed", [True, False])
+def test_what_cannot_be_printed_does_not_end_it(
+    closed: bool, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    made = gripper()
+    made.last_line = ""
+    if closed:
+        monkeypatch.setattr("sys.stdout", Closed())
+    made.say("\ud800 é")
+    assert made.last_line
+    if not closed:
+        assert capsys.readouterr().out == "The gripper: \\ud800 \\xe9\n"
+
+
 def test_its_returned_answers_are_no_commands() -> None:
     """A policy that echoes messages: they answered each other forever."""
     made, openings = gripper(), []

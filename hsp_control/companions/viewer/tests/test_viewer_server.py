@@ -389,6 +389,30 @@ def test_a_flood_is_no_more_than_its_newest_words(steered: PageServer) -> None:
     assert len(moves) < 100
 
 
+def test_a_refused_message_may_be_long(steered: PageServer) -> None:
+    """The reason of a disconnection has 123 bytes at most, or it is not sent."""
+    assert steered.url is not None
+    page = Steering(steered.url)
+    wait_until(lambda: page.drives() == (True, True))
+    page.send("y" * 300)
+    page.join(20.0)
+    assert page.socket.close_code == 1008
+    assert page.socket.close_reason.startswith("invalid literal for int()")
+
+
+@pytest.mark.parametrize(
+    ("host", "message"),
+    [
+        ("224.0.0.1", "address of many computers"),
+        ("255.255.255.255", "address of many computers"),
+        ("::1", "IPv6 address; give an IPv4 address"),
+    ],
+)
+def test_other_kinds_of_addresses_are_refused(host: str, message: str) -> None:
+    with pytest.raises(ViewerError, match=message):
+        PageServer(host=host)
+
+
 @pytest.mark.parametrize("raised", [SystemExit, KeyboardInterrupt])
 def test_a_server_that_ends_by_itself_is_reported_and_leaves_nothing(
     raised: type[BaseException], monkeypatch: pytest.MonkeyPatch
@@ -418,7 +442,7 @@ def test_a_server_that_ends_by_itself_is_reported_and_leaves_nothing(
         steered.messages,
         lambda: steered.wait_for_page(0.0),
     ):
-        with pytest.raises(ViewerError, match=f"has failed: {raised.__name__} why"):
+        with pytest.raises(ViewerError, match=f"has failed: {raised.__name__}: why"):
             use()
     steered.wait_until_closed()
     PageServer(port).close()

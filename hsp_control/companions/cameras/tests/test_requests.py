@@ -1,0 +1,66 @@
+"""Requests for pictures whose parts come late, or whose sender goes away."""
+
+import socket
+import struct
+import threading
+from collections.abc import Iterator
+from contextlib import suppress
+from multiprocessing import Value
+from time import monotonic, sleep
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+pytest.importorskip("mujoco")
+
+from hsp_control.companions.cameras import pictures
+
+
+@pytest.fixture
+def server() -> Iterator[pictures._Drawer]:
+    """A server of black pictures."""
+    made = pictures._Drawer(("127.0.0.1", 0), pictures._Handler)
+    black = np.zeros((480, 640, 3), dtype=np.uint8)
+    drawn = SimpleNamespace(cameras=["above"], drawn=lambda *_, **__: (0.0, black))
+    made.pictures = drawn  # type: ignore[assignment]
+    made.alive = Value("Q", 0)
+    thread = threading.Thread(target=made.serve_forever)
+    thread.start()
+    yield made
+    made.shutdown()
+    thread.join()
+    made.server_close()
+
+
+def test_a_request_arrives_in_two_seconds_or_not(
+    server: pictures._Drawer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A byte every 0.2 s: no byte is late, but the robot would wait for all of them."""
+    monkeypatch.setattr(pictures, "_REQUEST", 0.5)
+    with socket.create_connection(server.server_address[:2]) as client:
+        begin = monotonic()
+        with suppress(OSError):  # reset, or a broken pipe
+            for byte in b"GET /above.jpg HTTP/1.1\r\n" * 100:
+                client.send(bytes([byte]))
+                sleep(0.2)
+            pytest.fail("the server waits for all bytes")
+    alive = server.alive.value
+    while server.alive.value == alive:
+        assert monotonic() < begin + 60.0
+        sleep(0.01)
+
+
+def test_a_client_that_goes_away_is_forgotten(
+    server: pictures._Drawer, capfd: pytest.CaptureFixture[str]
+) -> None:
+    for _ in range(3):
+        client = socket.create_connection(server.server_address[:2])
+        linger = struct.pack("ii", 1, 0)  # close with a reset
+        client.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, linger)
+        client.sendall(b"GET /above.png HTTP/1.0\r\n\r\n")
+        client.close()
+    with socket.create_connection(server.server_address[:2]) as client:
+        client.sendall(b"GET /above.jpg HTTP/1.0\r\n\r\n")
+        assert client.recv(100).startswith(b"HTTP/1.0 200")
+    assert "Traceback" not in capfd.readouterr().err
