@@ -18,23 +18,28 @@ def suggesting(function: Callable[_Given, _Result]) -> Callable[_Given, _Result]
     TypeError, which this is as well. A function that takes any keyword checks its own.
     """
     named = Parameter.POSITIONAL_OR_KEYWORD, Parameter.KEYWORD_ONLY
+    takes = signature(function)
     names = [
         each.name
-        for each in signature(function).parameters.values()
+        for each in takes.parameters.values()
         if each.kind in named and each.name not in {"self", "cls"}
     ]
 
     @wraps(function)
     def called(*args: _Given.args, **given: _Given.kwargs) -> _Result:
+        what = function.__qualname__
+        if function.__name__ == "__init__":  # perhaps of a base
+            what = type(args[0]).__name__
         for name in given:
             if name not in names:
-                what = function.__qualname__
-                if function.__name__ == "__init__":
-                    what = type(args[0]).__name__
                 raise TypeError(
                     f"{what}: unknown argument {name!r}{did_you_mean(name, names)} "
                     f"(allowed: {listing(names, limit=20)})"
                 )
+        try:
+            takes.bind(*args, **given)
+        except TypeError as error:
+            raise TypeError(f"{what}: {error} (arguments: {listing(names)})") from None
         return function(*args, **given)
 
     return called

@@ -86,11 +86,18 @@ class Commanded(Composition):
             ControllerError: If there is no such task, or it follows no stream, or
                 nothing follows the given one.
         """
-        self._run_of(of)
-        return StreamHandle(
-            lambda: self._run_of(of),
-            on_send=lambda: self._memory.clock.look_again(),  # it will move
-        )
+        return StreamHandle(lambda: self._run_of(of), on_send=self._on_message)
+
+    def _on_message(self) -> None:
+        """Prepare the step that takes a message.
+
+        Unless the steps are those of another thread: it would have to wait, and its
+        processor's caches are others.
+        """
+        self._memory.clock.look_again()  # it will move
+        if self._memory.begun and self._lock.was_mine:
+            with self._lock:
+                self._rehearse(1)
 
     def _run_of(self, of: str | Streamed) -> StreamRun:
         """Return the stream of a task, or of a declaration, in the present run."""
@@ -154,9 +161,6 @@ class Commanded(Composition):
             self.at(self._state.t).ramp(RAMP).reference(task, reference)
         stream = self.stream(task)
         stream.send(**message)
-        with self._lock:
-            if self._memory.begun:
-                self._rehearse(1)
         return stream
 
     def _followed(self, task: str, *, at_last: bool = False) -> Task:

@@ -14,7 +14,7 @@ from hsp_control.constraints.limits import Limits, RobotLimits
 from hsp_control.control.changes import Change, TimeLine
 from hsp_control.control.declared import DeclaredController
 from hsp_control.control.declared_rates import check_rates
-from hsp_control.control.fitting import Base
+from hsp_control.control.fitting import Base, check_parts
 from hsp_control.control.in_force import InForce
 from hsp_control.control.memory import RunMemory
 from hsp_control.control.planned import PlannedTask
@@ -90,6 +90,7 @@ class Composition:
             HspControlError: If a part does not fit the robot; the message contains its
                 key path.
         """
+        check_parts("changes", changes, Change)
         law = tasks, field, null_space_gain, metric, singularity_threshold
         around = limits, contacts, base, scene, start
         self._declared = DeclaredController(robot, *law, *around)

@@ -334,7 +334,7 @@ class Controller(Commanded):
 
     def prepare(
         self,
-        state: RobotState,
+        state: RobotState | None = None,
         lifted: Collection[str] = (),
         without: Collection[str] = (),
     ) -> float:
@@ -345,7 +345,8 @@ class Controller(Commanded):
         that it will use.
 
         Args:
-            state: A state in which the others are active.
+            state: A state in which the others are active; None: the present one, or
+                the start.
             lifted: The names of the contacts that are not active.
             without: The names of the tasks that are not active.
 
@@ -354,8 +355,9 @@ class Controller(Commanded):
         """
         begun = perf_counter()
         with self._lock:
-            self._state.update(state.t, state.q, state.v)
             mixture = self._in_force.mixture
+            if state is not None:
+                self._state.update(state.t, state.q, state.v)
             mixture.bind(mixture.stack_without(lifted, without))
         return perf_counter() - begun
 

@@ -7,10 +7,12 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
+from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import ControllerError, FieldError
 from hsp_control.constraints.contacts import Contact
 from hsp_control.constraints.limits import Limits, RobotLimits
 from hsp_control.control.evolution import PRESENT, Evolution
+from hsp_control.control.first_state import check_angles
 from hsp_control.control.fitting import (
     Base,
     check_parts,
@@ -64,12 +66,13 @@ class DeclaredController:
                 "robot is a pinocchio.Model; needs Robot.from_pinocchio(model)"
             )
         check_kind("robot is", robot, Robot, ControllerError)
-        if not 0.0 < singularity_threshold < np.inf:
+        threshold = singularity_threshold
+        if not (isinstance(threshold, int | float) and 0.0 < threshold < np.inf):
             raise ControllerError(
-                f"singularity_threshold is {singularity_threshold}; must be positive"
+                f"singularity_threshold is {threshold!r}; must be positive"
             )
         self.robot, self.limits, self.base = robot, limits, base
-        self.threshold = float(singularity_threshold)
+        self.threshold = float(threshold)
         self.field = Rest() if field is None else field
         check_parts("tasks", tasks, Task)
         self.tasks = tuple(tasks)
@@ -87,7 +90,11 @@ class DeclaredController:
             check_kind("limits is", limits, Limits, ControllerError)
         self.scene = scene if isinstance(scene, Scene) else Scene(scene)
         # that of the first step where it is None
-        self.start = None if start is None else robot.check_configuration(start).copy()
+        self.start: Array | None = None
+        if start is not None:
+            with within("start"):
+                self.start = robot.check_configuration(start).copy()
+                check_angles(robot, self.start)
         check_support(robot, contacts, base)
         with within("null_space", "gain"):
             self.gain = as_gain(null_space_gain, "null_space_gain")

@@ -1,7 +1,7 @@
 """The lock of a controller, which several threads may share."""
 
 import os
-from threading import RLock
+from threading import RLock, get_ident
 from weakref import WeakSet
 
 from hsp_control.common.exceptions import ControllerError
@@ -10,18 +10,24 @@ from hsp_control.common.exceptions import ControllerError
 class StepLock:
     """A lock: other threads wait for it; re-entry by its holder raises."""
 
-    __slots__ = ("__weakref__", "_lock", "_taken")
+    __slots__ = ("__weakref__", "_last", "_lock", "_taken")
 
     def __init__(self) -> None:
         self._lock, self._taken = RLock(), ""  # why it cannot be acquired, if so
+        self._last = 0  # the thread that held it last
         _locks.add(self)
+
+    @property
+    def was_mine(self) -> bool:
+        """Whether this thread was the last one to hold it, and does not any more."""
+        return self._last == get_ident() and not self._taken
 
     def __enter__(self) -> None:
         self._lock.acquire()
         if self._taken:  # by this thread: others are still waiting
             self._lock.release()
             raise ControllerError(self._taken)
-        self._taken = _BY_ITSELF
+        self._taken, self._last = _BY_ITSELF, get_ident()
 
     def __exit__(self, *_: object) -> None:
         self._taken = ""

@@ -1,11 +1,13 @@
 """The handle of a controller's stream, by which it is commanded."""
 
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from typing import Any
 
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
+from hsp_control.common.exceptions import ControllerError, StreamError
 from hsp_control.trajectories.streams.message import Axes
 from hsp_control.trajectories.streams.run import StreamRun
 
@@ -14,7 +16,8 @@ class StreamHandle:
     """A stream of a controller, in its current run; see `Controller.stream`.
 
     `send` and `send_chunk` may be called from any thread, before the first step, too.
-    Counters and the record are those of the present run.
+    Counters and the record are those of the present run, or of the last one in which
+    something followed it; then these two raise a `StreamError`.
     """
 
     def __init__(
@@ -25,6 +28,21 @@ class StreamHandle:
         ``on_send`` is called with each message.
         """
         self._find, self._on_send = find, on_send
+        self._last = find()
+
+    def _run(self) -> StreamRun:
+        """Return the stream of the present run; the last one if nothing follows it."""
+        with suppress(ControllerError):
+            self._last = self._find()
+        return self._last
+
+    def _followed(self) -> StreamRun:
+        try:
+            return self._find()
+        except ControllerError as error:
+            raise StreamError(
+                f"nothing follows this stream any more: {error}"
+            ) from None
 
     def send(
         self,
@@ -35,7 +53,7 @@ class StreamHandle:
         t: float | None = None,
     ) -> None:
         """Send a target, or a velocity; see `StreamRun.send`."""
-        self._find().send(value, velocity=velocity, axes=axes, t=t)
+        self._followed().send(value, velocity=velocity, axes=axes, t=t)
         self._on_send()
 
     def send_chunk(
@@ -47,22 +65,22 @@ class StreamHandle:
         t: float | None = None,
     ) -> None:
         """Send waypoints; see `StreamRun.send_chunk`."""
-        self._find().send_chunk(values, times, velocities=velocities, t=t)
+        self._followed().send_chunk(values, times, velocities=velocities, t=t)
         self._on_send()
 
     def counts(self) -> dict[str, float]:
         """Return the time since the last message [s], and the number of messages."""
-        return self._find().counts()
+        return self._run().counts()
 
     @property
     def record(self) -> tuple[Mapping[str, Any], ...]:
         """The messages that the run has read, and when; see `Streamed.messages`."""
-        return self._find().record
+        return self._run().record
 
     @property
     def last_rejection(self) -> str:
         """Error of the last invalid message from another process; empty for none."""
-        return self._find().last_rejection
+        return self._run().last_rejection
 
     def __repr__(self) -> str:
-        return f"StreamHandle of {self._find()!r}"
+        return f"StreamHandle of {self._run()!r}"

@@ -105,6 +105,25 @@ class ValueClass(ABCMeta):
         """Ignore pydantic's, which has metadata that only pydantic reads."""
 
 
+class _DocstringOfClasses:
+    """The docstrings of parts where they are read as `help` does: without `__get__`."""
+
+    def __init__(self, own: str | None) -> None:
+        self._own = own
+
+    def __get__(self, cls: type | None, _: type | None = None) -> Any:
+        if cls is None:
+            return self._own
+        found = vars(cls).get("__doc__")
+        return found.__get__(None, cls) if isinstance(found, _Docstring) else found
+
+    def __set__(self, cls: type, value: object) -> None:
+        type.__dict__["__doc__"].__set__(cls, value)
+
+
+ValueClass.__doc__ = _DocstringOfClasses(ValueClass.__doc__)  # type: ignore[assignment]
+
+
 def _hide_properties(cls: type) -> list[str]:
     """Return the fields without default that hide an inherited property."""
     own = vars(cls)

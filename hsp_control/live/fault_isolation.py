@@ -18,14 +18,15 @@ _EVIDENT = 0.05
 class FaultIsolation:
     """Isolates the wrong source of joints whose velocity contradicts their positions.
 
-    The wrong one deviates more from the model's expectation, if one deviates at all:
-    slow drifts of a velocity are expected as they come. A fault often affects the
-    sensors of several joints: once one kind of source was wrong beyond doubt, and not
-    the other kind, it is wrong in joints in doubt, too, also in those of which neither
-    was trusted. Unless a kind is known, the joints in doubt are decided together: none,
-    if one of them is undecided; but like earlier ones, if these were decided alike: of
-    a wrong model all joints may be in doubt. Where the case is not clear, and the
-    difference is slight, a source that is constant to the last bit is the wrong one.
+    The wrong one deviates more from the model's expectation. If neither deviates, as
+    in a slow drift, it is of the kind that other joints have lost. A fault often
+    affects the sensors of several joints: once one kind of source was wrong beyond
+    doubt, and not the other kind, it is wrong in joints in doubt, too, also in those of
+    which neither was trusted. Unless a kind is known, the joints in doubt are decided
+    together: none, if one of them is undecided; but like earlier ones, if these were
+    decided alike: of a wrong model all joints may be in doubt. Where the case is not
+    clear, and the difference is slight, a source that is constant to the last bit is
+    the wrong one.
 
     Attributes:
         undecided: Joints of which neither source is trusted, since the wrong one is
@@ -39,7 +40,12 @@ class FaultIsolation:
         self.undecided: Flags = np.zeros(joints, dtype=bool)
 
     def isolate(
-        self, wrong: Flags, surprise: Array, constant: Flags, slight: Flags
+        self,
+        wrong: Flags,
+        surprise: Array,
+        constant: Flags,
+        slight: Flags,
+        trusted: Flags,
     ) -> tuple[Flags, Flags]:
         """Return whether the velocity, and whether the positions are right, (nv,).
 
@@ -50,9 +56,14 @@ class FaultIsolation:
                 expectation, shape (2, nv) [rad/s or m/s].
             constant: Whether a source does not change by a bit, shape (2, nv).
             slight: Whether a joint's sources are little different, shape (nv,).
+            trusted: The sources that are trusted so far, shape (2, nv).
         """
         greatest = surprise.max(axis=0)
-        right = (surprise < _CLEARLY * greatest) & (greatest > _EVIDENT)
+        right = surprise < _CLEARLY * greatest
+        lost = ~trusted & trusted[::-1]
+        alike: Flags = lost.any(axis=1)
+        if alike[0] != alike[1]:
+            right = np.where(greatest > _EVIDENT, right, ~alike[:, None])
         known = self._wrong_kind[0] != self._wrong_kind[1]
         clear = surprise < (_OTHERWISE if known else _BEYOND_DOUBT) * greatest
         clear &= greatest > _EVIDENT

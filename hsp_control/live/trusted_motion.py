@@ -286,7 +286,11 @@ class TrustedMotion:
         check, expected, isolation = self._check, self._expected, self._isolation
         slight = check.difference < self._error
         right_v, right_q = isolation.isolate(
-            wrong & ~jumps, expected.surprise[:2], check.constant, slight
+            wrong & ~jumps,
+            expected.surprise[:2],
+            check.constant,
+            slight,
+            np.stack([self._velocities, self._positions]),
         )
         decided = isolation.undecided & (right_v ^ right_q)
         expected.begin_again(decided, np.where(right_v, v, check.slope))

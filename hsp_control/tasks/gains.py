@@ -65,6 +65,12 @@ class Gains(Part, error=GainError):
     def matrices(self, rows: int) -> tuple[Array, Array]:
         """Return Kp and Kv as matrices of shape (rows, rows)."""
         kp, kv = self._pair()
+        for name in ("natural_frequency", "damping_ratio"):
+            given = getattr(self, name)
+            if given is not None and np.ndim(given) and len(given) != rows:
+                raise GainError(
+                    f"{name} has {len(given)} entries; needs a number, or {rows}"
+                )
         Kp = as_matrix(kp, rows, "kp")
         Kv = as_matrix(kv, rows, "kv")
         companion = np.block([[np.zeros((rows, rows)), np.eye(rows)], [-Kp, -Kv]])

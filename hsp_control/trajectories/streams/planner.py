@@ -302,6 +302,8 @@ class Planner:
         Args:
             messages: Those that the next step takes; by default one to stay here.
         """
+        if messages:
+            self._make_room(messages)  # which stays: the next step has no time for it
         with self._taken_back():
             if not self.begun:
                 self.advance(0.0, ())

@@ -39,6 +39,8 @@ def test_an_unknown_argument_is_named_with_the_nearest_one() -> None:
         )
         with pytest.raises(TypeError, match=output):
             call(**{wrong: 1})
-    with pytest.raises(TypeError, match="missing 1 required positional argument"):
+    with pytest.raises(TypeError, match=r"^Controller: missing .* 'tasks' "):
         hsp.Controller(None)  # type: ignore[call-arg]
+    with pytest.raises(TypeError, match=r"^Controller: too many positional arguments"):
+        hsp.Controller(None, [], None, 3.0)  # type: ignore[misc]
     assert "robot" in inspect.signature(hsp.Controller).parameters

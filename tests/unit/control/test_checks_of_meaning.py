@@ -79,6 +79,13 @@ def test_degrees_are_named_in_python_and_in_yaml(
     controller = hsp.Controller(PANDA, [hsp.FramePosition("panda_tcp")])
     with pytest.raises(HspControlError, match="degrees"):
         controller.compute(0.0, degrees, REST)
+    with pytest.raises(HspControlError, match=r"^start: .*degrees"):
+        hsp.Controller(PANDA, [hsp.FramePosition("panda_tcp")], start=degrees)
+    with pytest.raises(HspControlError, match=r"^changes contains 'x'"):
+        hsp.Controller(PANDA, [], changes=["x"])  # type: ignore[list-item]
+    three = hsp.Gains(natural_frequency=[1.0, 2.0, 3.0])
+    with pytest.raises(HspControlError, match="natural_frequency has 3 entries; "):
+        hsp.Controller(PANDA, [hsp.FramePose("panda_tcp", gains=three)])
     limits = controller.limits
     assert limits is not None
     with pytest.raises(LimitError, match=r"at -45, .*degrees\? Angles are in rad"):

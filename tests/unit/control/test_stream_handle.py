@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import hsp_control as hsp
+from hsp_control.common.exceptions import StreamError
 from hsp_control.control.stream_handle import StreamHandle
 
 ROBOT = hsp.Robot.load("panda")
@@ -73,8 +74,44 @@ def test_a_target_gives_the_same_stream() -> None:
     made.compute(5.1, ROBOT.home(), REST)
     assert stream.counts()["taken"] == 2.0
     made.at(5.1).reference("hand", hsp.Hold())
-    with pytest.raises(hsp.HspControlError, match="follows no stream"):
+    with pytest.raises(StreamError, match="any more: task 'hand' follows no stream"):
         stream.send(TARGET)
+    made.at(5.1).remove("hand")
+    made.compute(5.2, ROBOT.home(), REST)
+    with pytest.raises(StreamError, match="any more: there is no task 'hand'"):
+        stream.send_chunk([TARGET], [1.0])
+    assert stream.counts()["taken"] == 2.0
+    assert len(stream.record) == 2
+    assert "StreamRun of Stream" in repr(stream)
+
+
+def test_the_next_step_has_room_for_a_chunk() -> None:
+    """Memory for it is made when it is sent, not in the step."""
+    made = controller(hsp.trajectories.Stream())
+    stream = made.stream("hand")
+    run(made, 0.1)
+    room = made.streams[0]._planned._room
+    stream.send_chunk(np.tile(TARGET, (100, 1)), np.arange(1, 101) * 0.01)
+    extended = made.streams[0]._planned._room
+    assert extended.waypoints > room.waypoints
+    made.compute(0.11, ROBOT.home(), REST)
+    assert made.streams[0]._planned._room == extended
+
+
+def test_only_the_thread_of_the_steps_rehearses_the_next_one() -> None:
+    """The other would hold the lock meanwhile, for the time of many steps."""
+    made = controller(hsp.trajectories.Stream())
+    stream, rehearsed = made.stream("hand"), list[int]()
+    made._rehearse = rehearsed.append  # type: ignore[method-assign]
+    stream.send(TARGET)
+    assert rehearsed == []  # nothing has begun
+    run(made, 0.1)
+    sender = Thread(target=stream.send, args=(TARGET,))
+    sender.start()
+    sender.join()
+    assert rehearsed == []
+    stream.send(TARGET)
+    assert rehearsed == [1]
 
 
 def test_a_target_that_is_refused_changes_nothing() -> None:

@@ -8,6 +8,7 @@ from hsp_control.live.fault_isolation import FaultIsolation
 CLEAR, DOUBTFUL, UNDECIDED = 0.2, 0.4, 0.8  # ratios of the two surprises
 V, Q = (True, False), (False, True)
 NEITHER = (False, False)
+BOTH = "v.", "q."
 
 
 def isolated(
@@ -16,16 +17,23 @@ def isolated(
     wrong: str = "",
     constant: str = "",
     slight: bool = True,
+    trusted: str = "",
 ) -> list[tuple[bool, bool]]:
     """Return the right sources of joints with these surprises of (v, q).
 
-    ``wrong``: "1" for joints with one wrong source; all by default.
+    ``wrong``: "1" for joints with one wrong source; all by default. ``trusted``: "v" or
+    "q" for joints of which only that one is trusted so far, "." for both.
     """
     joints = np.array([each == "1" for each in wrong or "1" * len(surprises)])
     still = np.array([each in constant.split() for each in "vq"])[:, None]
     still = np.tile(still, joints.size)
+    used = [[each in kind for each in trusted or "." * len(joints)] for kind in BOTH]
     by_v, by_q = isolation.isolate(
-        joints, np.array(surprises).T, still, np.full(joints.size, slight)
+        joints,
+        np.array(surprises).T,
+        still,
+        np.full(joints.size, slight),
+        np.array(used),
     )
     return list(zip(by_v.tolist(), by_q.tolist(), strict=True))
 
@@ -34,6 +42,18 @@ def test_the_source_that_deviates_less_is_right() -> None:
     assert isolated(FaultIsolation(2), (CLEAR, 1.0), (1.0, CLEAR)) == [V, Q]
     assert isolated(FaultIsolation(1), (DOUBTFUL, 1.0)) == [V]
     assert isolated(FaultIsolation(1), (UNDECIDED, 1.0)) == [NEITHER]
+
+
+@pytest.mark.parametrize(("trusted", "right"), [("q.", Q), ("v.", V), ("..", V)])
+def test_without_evidence_the_lost_kind_of_the_others_is_wrong(
+    trusted: str, right: tuple[bool, bool]
+) -> None:
+    """A velocity that drifts slowly is expected as it comes: 0.003 to 0.007 rad/s."""
+    slow = {"wrong": "01", "trusted": trusted}
+    found = isolated(FaultIsolation(2), (0.0, 0.0), (0.003, 0.007), **slow)
+    assert found[1] == right
+    found = isolated(FaultIsolation(2), (0.0, 0.0), (0.03, 0.07), **slow)
+    assert found[1] == V
 
 
 def test_of_joints_in_doubt_one_that_is_undecided_leaves_none_decided() -> None:
