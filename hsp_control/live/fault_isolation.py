@@ -61,7 +61,7 @@ class FaultIsolation:
         greatest = surprise.max(axis=0)
         right = surprise < _CLEARLY * greatest
         lost = ~trusted & trusted[::-1]
-        alike: Flags = lost.any(axis=1)
+        alike = np.asarray(lost.any(axis=1))
         if alike[0] != alike[1]:
             right = np.where(greatest > _EVIDENT, right, ~alike[:, None])
         known = self._wrong_kind[0] != self._wrong_kind[1]
