@@ -143,6 +143,8 @@ class Planner:
         """
         if self._piece.item() != self._number:
             self._remember()
+            if self._starts:
+                self._forget(self.now)
         if t < self._start:
             if t < self._oldest:
                 raise StreamError(
