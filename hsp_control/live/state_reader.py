@@ -419,8 +419,8 @@ _LARGEST_LEAD = 0.1
 _HELD, _LEAST_HELD = 0.01, 2
 """Duration of missing states over which an effort is held [s], two of them in any case
 [periods]: an arm that accelerates gains less speed, and one lost state in ten does not
-change a task's error at 1, 2 and 10 ms; at 5 ms, where sometimes three are lost, it
-becomes 0.6 mm instead of 0.1."""
+change a task's error at 1, 2 and 10 ms; at 5 ms, where sometimes three are lost in a
+row, it becomes 0.6 mm instead of 0.1."""
 _FEW = 5
 """Number of consecutive missing states after which a speed is the model's."""
 _READ_MARGIN = 0.5
