@@ -29,7 +29,7 @@ from shared.marked_sections import RESULTS, replace_section
 
 import hsp_control as hsp
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import HspControlError
+from hsp_control.common.errors import HspControlError
 
 ROOT = Path(__file__).resolve().parents[1]
 ROBOTS, PERIOD = ("panda", "iiwa14", "xarm7"), 0.01

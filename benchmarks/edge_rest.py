@@ -23,7 +23,7 @@ from shared.marked_sections import RESULTS, replace_section
 
 import hsp_control as hsp
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import SimulationError
+from hsp_control.common.errors import SimulationError
 from hsp_control.robot.inverse_kinematics import Target
 from hsp_control.simulation.plants import Push, RigidBodyPlant
 from hsp_control.trajectories import ComposedPose, HoldOrientation

@@ -12,10 +12,14 @@ from prose import plain
 
 import hsp_control
 
+_VALUES = {name: getattr(hsp_control, name) for name in dir(hsp_control)}
 _SPACES = {
-    **hsp_control._NAMESPACES,
-    **{"control": "control", "geometry": "geometry"},
-    **{name: f"companions.{name}" for name in hsp_control._companions()},
+    **{
+        name: value.__name__
+        for name, value in _VALUES.items()
+        if isinstance(value, ModuleType)
+    },
+    **{name: f"hsp_control.{name}" for name in ("control", "geometry")},
 }
 """The namespaces, two rooms whose classes are at the top, and the companions."""
 
@@ -23,9 +27,10 @@ _SPACES = {
 def names_page() -> str:
     """Return the page of the top-level names, with links to their namespaces' pages."""
     rows, homes = [], _homes()
-    for name, room in hsp_control._HOMES.items():
-        value = getattr(hsp_control, name)
-        path = homes.get(_home(value), f"hsp_control.{room}.{name}")
+    for name, value in _VALUES.items():
+        if name in _SPACES or name == "__version__":
+            continue
+        path = homes.get(_home(value), _home(value))
         rows.append(f"| {{py:obj}}`hsp.{name} <{path}>` | {_summary(value)} |")
     spaces = [f"hsp.{name}" for name in sorted(_SPACES)]
     tree = "\n".join(spaces)
@@ -48,7 +53,7 @@ def namespace_pages() -> Iterable[tuple[str, str]]:
     """Return the pages of namespaces, with their names."""
     homes = _homes()
     for name, room in _SPACES.items():
-        module = import_module(f"hsp_control.{room}")
+        module = import_module(room)
         yield name, _namespace(name, module, homes)
 
 
@@ -56,7 +61,7 @@ def _homes() -> dict[str, str]:
     """Return the names under which classes and functions are described, once."""
     found: dict[str, str] = {}
     for room in _SPACES.values():
-        module = import_module(f"hsp_control.{room}")
+        module = import_module(room)
         for name, value in _public(module).items():
             found.setdefault(_home(value), f"{module.__name__}.{name}")
     return found

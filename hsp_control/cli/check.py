@@ -11,7 +11,7 @@ from rich.table import Table
 
 from hsp_control.cli.consoles import out
 from hsp_control.cli.loading import load
-from hsp_control.common.exceptions import ConfigurationError
+from hsp_control.common.errors import ConfigurationError
 from hsp_control.common.suggestions import listing
 from hsp_control.config import Experiment
 from hsp_control.control import Controller, ControlOutput, Diagnostics

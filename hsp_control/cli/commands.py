@@ -23,7 +23,7 @@ from hsp_control.cli.consoles import out as _out
 from hsp_control.cli.interrupts import INTERRUPTED, DeferredInterrupt
 from hsp_control.cli.loading import read
 from hsp_control.cli.stopwatch import Stopwatch
-from hsp_control.common.exceptions import LogError, SimulationError
+from hsp_control.common.errors import LogError, SimulationError
 from hsp_control.common.unicode_text import utf8
 from hsp_control.config import Experiment, json_schema
 from hsp_control.config.loaded_scenario import LoadedScenario, load_scenario

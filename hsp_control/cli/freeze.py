@@ -5,7 +5,7 @@ import argparse
 from hsp_control.cli.consoles import out
 from hsp_control.cli.live_experiment import live_period
 from hsp_control.cli.loading import read
-from hsp_control.common.exceptions import ConfigError
+from hsp_control.common.errors import ConfigError
 from hsp_control.config import Experiment
 from hsp_control.config.loaded_scenario import load_scenario
 from hsp_control.frozen import cmake_folder, compiler_flags

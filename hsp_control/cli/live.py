@@ -19,7 +19,7 @@ from hsp_control.cli.live_experiment import (
 )
 from hsp_control.cli.loading import read
 from hsp_control.cli.robot_process import RobotProcess
-from hsp_control.common.exceptions import LiveError, LogError
+from hsp_control.common.errors import LiveError, LogError
 from hsp_control.config import Experiment
 from hsp_control.config.loaded_scenario import load_scenario
 from hsp_control.control.compensation import CompensatedController

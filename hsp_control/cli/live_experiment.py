@@ -10,7 +10,7 @@ import numpy as np
 
 from hsp_control.cli.loading import load
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import HardwareError
+from hsp_control.common.errors import HardwareError
 from hsp_control.config import Experiment
 from hsp_control.config.document import Document
 from hsp_control.config.loaded_scenario import load_scenario

@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from hsp_control.common.exceptions import AccessError
+from hsp_control.common.errors import AccessError
 from hsp_control.config import Experiment
 from hsp_control.config.document import Document, read_document
 from hsp_control.config.experiment import build

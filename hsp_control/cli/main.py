@@ -9,7 +9,7 @@ from typing import Any
 from hsp_control.cli.interrupts import INTERRUPTED, end_in_order
 from hsp_control.cli.options import AddedCommand, command_line
 from hsp_control.cli.streams import lost_text, make_usable
-from hsp_control.common.exceptions import HspControlError
+from hsp_control.common.errors import HspControlError
 
 _OWN_FILES = {"check", "doctor", "freeze", "live"}
 """Commands with their own file; `commands` has the others."""

@@ -16,7 +16,7 @@ import numpy as np
 
 from hsp_control.cli.live_experiment import check_live, live_period, simulated_robot
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import HardwareError, HspControlError
+from hsp_control.common.errors import HardwareError, HspControlError
 from hsp_control.config import Experiment, load_experiment
 from hsp_control.config.streams import without_sources
 from hsp_control.control.measurement import LogChannel

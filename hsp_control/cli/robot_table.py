@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from hsp_control.common.exceptions import ModelError
+from hsp_control.common.errors import ModelError
 from hsp_control.common.resources import bundled_robots
 from hsp_control.common.suggestions import listing
 from hsp_control.robot import Robot

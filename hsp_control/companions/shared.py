@@ -1,29 +1,8 @@
 """Code that several companions share, and the core does not need."""
 
-from collections.abc import Callable, Mapping
-from importlib import import_module
+from collections.abc import Mapping
 from math import inf
-from typing import Any
 from urllib.parse import unquote
-
-
-def at_first_use(
-    package: str, names: Mapping[str, str]
-) -> tuple[Callable[[str], Any], Callable[[], list[str]]]:
-    """Return a package's ``__getattr__`` and ``__dir__``: names are imported when used.
-
-    Args:
-        package: Its ``__name__``.
-        names: Its modules with their public names, between spaces.
-    """
-    homes = {name: module for module, there in names.items() for name in there.split()}
-
-    def attribute(name: str) -> Any:
-        if name not in homes:
-            raise AttributeError(f"module {package!r} has no attribute {name!r}")
-        return getattr(import_module(f"{package}.{homes[name]}"), name)
-
-    return attribute, lambda: sorted(homes)
 
 
 def name_and_options(address: str) -> tuple[str, dict[str, str]]:

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from hsp_control.common.exceptions import ConfigError, HspControlError
+from hsp_control.common.errors import ConfigError, HspControlError
 from hsp_control.common.regular_file import check_ends
 from hsp_control.common.resources import bundled_configs, is_file
 from hsp_control.common.suggestions import did_you_mean, listing, nearest

@@ -13,7 +13,7 @@ import yaml
 from numpy.typing import ArrayLike
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import (
+from hsp_control.common.errors import (
     ConfigError,
     ImmutableError,
     ModelError,
@@ -27,9 +27,9 @@ from hsp_control.constraints.limits import Limits
 from hsp_control.control.changes import Change
 from hsp_control.control.compensation import Compensation, RateFinding, check_rate
 from hsp_control.control.controller import Controller
-from hsp_control.control.estimator import Estimator, begun
+from hsp_control.control.estimation import Estimator, begun
 from hsp_control.control.fitting import Base
-from hsp_control.control.motion_plan import MotionPlan
+from hsp_control.control.plans import MotionPlan
 from hsp_control.declaration.nested import parts_within
 from hsp_control.declaration.own_modules import own_modules
 from hsp_control.declaration.plain_data import plain_data

@@ -9,7 +9,7 @@ from typing import NamedTuple, TypeVar
 from pydantic import TypeAdapter, ValidationError
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import HspControlError
+from hsp_control.common.errors import HspControlError
 from hsp_control.common.suggestions import did_you_mean
 from hsp_control.config.document import Document
 from hsp_control.config.own_code import located_imports, run_imports

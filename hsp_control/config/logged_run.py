@@ -2,7 +2,7 @@
 
 import logging
 
-from hsp_control.common.exceptions import ConfigError, HspControlError
+from hsp_control.common.errors import ConfigError, HspControlError
 from hsp_control.config.document import Document
 from hsp_control.config.experiment import build
 from hsp_control.control.controller import Controller

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from os import PathLike, fspath
 from pathlib import Path
 
-from hsp_control.common.exceptions import AccessError
+from hsp_control.common.errors import AccessError
 from hsp_control.config.document import Document
 from hsp_control.declaration.imported import fingerprints, import_code, is_file_name
 

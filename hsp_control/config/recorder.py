@@ -9,7 +9,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hsp_control.common.exceptions import LogError
+from hsp_control.common.errors import LogError
 from hsp_control.common.keywords import suggesting
 from hsp_control.control.controller import Controller
 from hsp_control.control.output import ControlOutput

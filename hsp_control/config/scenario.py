@@ -12,13 +12,13 @@ from typing import Annotated, Any, Literal
 from pydantic import AfterValidator, BeforeValidator, Field, TypeAdapter
 from pydantic.json_schema import GenerateJsonSchema
 
-from hsp_control.common.exceptions import ConfigError, FieldError, ViewerError
+from hsp_control.common.errors import ConfigError, FieldError, ViewerError
 from hsp_control.constraints.contacts import Contact
 from hsp_control.constraints.limits import Limits, LimitsOrNone
 from hsp_control.control.changes import Change
 from hsp_control.control.compensation import Compensation
-from hsp_control.control.estimator import Estimators
-from hsp_control.control.motion_plan import MotionPlan
+from hsp_control.control.estimation import Estimators
+from hsp_control.control.plans import MotionPlan
 from hsp_control.declaration import Part, within
 from hsp_control.declaration.nested import BY_NAME
 from hsp_control.declaration.plain_data import plain_data

@@ -6,7 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from hsp_control.common.exceptions import AccessError
+from hsp_control.common.errors import AccessError
 from hsp_control.config.scenario import Scenario
 from hsp_control.declaration import within
 from hsp_control.declaration.nested import with_parts_replaced

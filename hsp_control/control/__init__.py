@@ -1,5 +1,5 @@
 """From tasks, a field and constraints to an effort."""
 
-from .controller import Controller as Controller
-from .output import ControlOutput as ControlOutput
-from .output import Diagnostics as Diagnostics
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

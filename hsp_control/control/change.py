@@ -8,7 +8,7 @@ from typing import Annotated, Any, Self, TypeVar
 import numpy as np
 from pydantic import AfterValidator
 
-from hsp_control.common.exceptions import ContactError, ControllerError
+from hsp_control.common.errors import ContactError, ControllerError
 from hsp_control.common.suggestions import did_you_mean, listing
 from hsp_control.constraints.contacts import CommandedForce
 from hsp_control.constraints.limits import LimitsOrNone, RobotLimits

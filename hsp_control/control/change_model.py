@@ -7,7 +7,7 @@ import numpy as np
 
 from hsp_control import engine
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import ControllerError
+from hsp_control.common.errors import ControllerError
 from hsp_control.control.change import Change
 from hsp_control.control.evolution import ABSENT
 from hsp_control.control.model_in_force import CarriedBody, PlannedPayload

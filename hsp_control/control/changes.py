@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hsp_control.common.entry_points import own_names
-from hsp_control.common.exceptions import ControllerError
+from hsp_control.common.errors import ControllerError
 from hsp_control.common.suggestions import did_you_mean
 from hsp_control.constraints.contacts import CommandedForce
 from hsp_control.constraints.limits import Limits

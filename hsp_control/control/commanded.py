@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from hsp_control.common.exceptions import ControllerError
+from hsp_control.common.errors import ControllerError
 from hsp_control.control.changes import Change, Changes
 from hsp_control.control.composition import Composition
 from hsp_control.control.declared_rates import check_rates

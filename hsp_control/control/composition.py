@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import ControllerError, ImmutableError
+from hsp_control.common.errors import ControllerError, ImmutableError
 from hsp_control.common.keywords import suggesting
 from hsp_control.constraints.contacts import Contact
 from hsp_control.constraints.limits import Limits, RobotLimits

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import ControllerError, NonFiniteError
+from hsp_control.common.errors import ControllerError, NonFiniteError
 from hsp_control.control.active_stack import ActiveStack
 from hsp_control.control.actuation import Actuation
 from hsp_control.control.bound_mixture import BoundMixture

@@ -5,7 +5,7 @@ from math import acos, degrees
 import numpy as np
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import FallError
+from hsp_control.common.errors import FallError
 from hsp_control.robot import RobotState
 
 MAX_TILT = np.radians(45.0)

@@ -5,7 +5,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import ConfigurationError
+from hsp_control.common.errors import ConfigurationError
 from hsp_control.common.warned import warn
 from hsp_control.constraints.limits import RobotLimits, in_degrees
 from hsp_control.declaration.language import spoken

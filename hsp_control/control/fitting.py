@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import ContactError, ControllerError, GainError
+from hsp_control.common.errors import ContactError, ControllerError, GainError
 from hsp_control.constraints.contacts import Contact
 from hsp_control.declaration import Part, within
 from hsp_control.declaration.language import check_kind, shortened

@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import UnstableRateError
+from hsp_control.common.errors import UnstableRateError
 from hsp_control.control.active_stack import ActiveStack
 from hsp_control.control.evolution import Evolution
 from hsp_control.control.followed_impedance import FollowedImpedance

@@ -12,7 +12,7 @@ from copy import copy
 import numpy as np
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import ControllerError
+from hsp_control.common.errors import ControllerError
 from hsp_control.control.active_stack import ActiveStack
 from hsp_control.control.actuation import Actuation, Delivered, Status
 from hsp_control.control.actuation.limits_in_force import LimitSet, LimitsInForce

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import ControllerError
+from hsp_control.common.errors import ControllerError
 from hsp_control.common.suggestions import did_you_mean, listing
 from hsp_control.control.active_stack import ActiveStack, Layout
 from hsp_control.control.actuation import Delivered, Status

@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import ControllerError
+from hsp_control.common.errors import ControllerError
 from hsp_control.common.suggestions import did_you_mean, listing
 from hsp_control.constraints.contacts import CommandedForce
 from hsp_control.control.evolution import ABSENT, Evolution

@@ -9,7 +9,7 @@ from typing import Any, NoReturn, TypeVar, cast
 import numpy as np
 
 from hsp_control.common.arrays import read_only_view
-from hsp_control.common.exceptions import ImmutableError
+from hsp_control.common.errors import ImmutableError
 from hsp_control.control.actuation.support import Support
 from hsp_control.control.evolution import Evolution, Transition
 from hsp_control.control.planned import PlannedTask

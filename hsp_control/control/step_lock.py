@@ -4,7 +4,7 @@ import os
 from threading import RLock, get_ident
 from weakref import WeakSet
 
-from hsp_control.common.exceptions import ControllerError
+from hsp_control.common.errors import ControllerError
 
 
 class StepLock:

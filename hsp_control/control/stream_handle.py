@@ -7,7 +7,7 @@ from typing import Any
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from hsp_control.common.exceptions import ControllerError, StreamError
+from hsp_control.common.errors import ControllerError, StreamError
 from hsp_control.trajectories.streams.message import Axes
 from hsp_control.trajectories.streams.run import StreamRun
 

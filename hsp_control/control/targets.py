@@ -7,7 +7,7 @@ import numpy as np
 import pinocchio as pin
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import ControllerError
+from hsp_control.common.errors import ControllerError
 from hsp_control.declaration.language import shortened
 from hsp_control.declaration.quantities import numbers
 from hsp_control.declaration.rotation import matrix_of

@@ -8,7 +8,7 @@ from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler
 from pydantic.dataclasses import rebuild_dataclass
 from pydantic_core import CoreSchema, SchemaValidator, core_schema
 
-from hsp_control.common.exceptions import ConfigError
+from hsp_control.common.errors import ConfigError
 from hsp_control.declaration.families import Declared, check_admitted, full_name
 from hsp_control.declaration.language import joined
 from hsp_control.declaration.quantities import plain

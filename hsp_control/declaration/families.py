@@ -11,7 +11,7 @@ import numpy as np
 from pydantic_core import CoreSchema, PydanticCustomError
 
 from hsp_control.common.entry_points import entry_points, is_ours
-from hsp_control.common.exceptions import AccessError, ConfigError, HspControlError
+from hsp_control.common.errors import AccessError, ConfigError, HspControlError
 
 
 class Declared:

@@ -13,7 +13,7 @@ from typing import Any
 
 from pydantic import BeforeValidator, WithJsonSchema
 
-from hsp_control.common.exceptions import ConfigError
+from hsp_control.common.errors import ConfigError
 from hsp_control.common.regular_file import why_endless, why_no_file
 from hsp_control.common.suggestions import did_you_mean, listing
 from hsp_control.declaration.language import spoken

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from hsp_control.common.exceptions import HspControlError
+from hsp_control.common.errors import HspControlError
 from hsp_control.common.suggestions import listing, nearest
 from hsp_control.declaration.families import Declared, Family, value_fields
 

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TypeAlias
 
-from hsp_control.common.exceptions import ConfigError, HspControlError
+from hsp_control.common.errors import ConfigError, HspControlError
 from hsp_control.declaration.language import shortened
 
 KeyPath: TypeAlias = tuple[str | int, ...]

@@ -16,7 +16,7 @@ from typing import Any, NamedTuple, Protocol, TypeAlias, get_args, get_origin
 from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
-from hsp_control.common.exceptions import HspControlError
+from hsp_control.common.errors import HspControlError
 from hsp_control.common.suggestions import did_you_mean, listing, nearest
 from hsp_control.declaration.families import Declared
 from hsp_control.declaration.language import joined, kind, misfit, shown, spoken

@@ -7,7 +7,7 @@ from typing import Any, TypeVar
 
 from pydantic import BeforeValidator
 
-from hsp_control.common.exceptions import ConfigError
+from hsp_control.common.errors import ConfigError
 from hsp_control.declaration.located import within
 from hsp_control.declaration.part import Part
 

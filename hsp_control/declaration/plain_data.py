@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
-from hsp_control.common.exceptions import ConfigError
+from hsp_control.common.errors import ConfigError
 from hsp_control.declaration import schema
 from hsp_control.declaration.by_type import ByType, as_entry
 from hsp_control.declaration.families import Declared, same

@@ -21,7 +21,7 @@ from pydantic import (
 from pydantic_core import CoreSchema, core_schema
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import ImmutableError
+from hsp_control.common.errors import ImmutableError
 
 
 def plain(value: Any) -> Any:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 from pydantic import ConfigDict, ValidationError
 from pydantic.dataclasses import dataclass
 
-from hsp_control.common.exceptions import HspControlError, ImmutableError
+from hsp_control.common.errors import HspControlError, ImmutableError
 from hsp_control.declaration.families import Family
 from hsp_control.declaration.in_python import (
     plain_signature,

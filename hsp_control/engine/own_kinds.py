@@ -15,7 +15,7 @@ import sysconfig
 from pathlib import Path
 from types import SimpleNamespace
 
-from hsp_control.common.exceptions import EngineError
+from hsp_control.common.errors import EngineError
 from hsp_control.engine._engine import Kind, load_library
 
 _LOADED: dict[Path, SimpleNamespace] = {}

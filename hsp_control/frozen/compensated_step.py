@@ -12,7 +12,7 @@ import numpy as np
 
 from hsp_control import engine
 from hsp_control.common.arrays import Array, Indices
-from hsp_control.common.exceptions import FreezeError
+from hsp_control.common.errors import FreezeError
 from hsp_control.control.active_stack import ActiveStack
 from hsp_control.control.actuation.actuation import Actuation
 from hsp_control.control.actuation.delivered import DeliveredAlone

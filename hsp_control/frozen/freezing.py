@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from hsp_control import engine
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import FreezeError
+from hsp_control.common.errors import FreezeError
 from hsp_control.common.keywords import suggesting
 from hsp_control.control.active_stack import ActiveStack
 from hsp_control.control.actuation.actuation import Actuation

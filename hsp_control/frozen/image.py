@@ -22,7 +22,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hsp_control.common.exceptions import FreezeError
+from hsp_control.common.errors import FreezeError
 from hsp_control.engine import BUILD, Call, Dynamics, Move, Plan, PythonCall
 from hsp_control.engine.own_kinds import library_of_own
 

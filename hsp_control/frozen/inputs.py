@@ -12,7 +12,7 @@ import numpy as np
 
 from hsp_control import engine
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import FreezeError
+from hsp_control.common.errors import FreezeError
 from hsp_control.constraints.contacts.contact import (
     NORMAL,
     WRENCH,

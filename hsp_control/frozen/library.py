@@ -5,7 +5,7 @@ import sys
 from pathlib import Path
 
 from hsp_control import engine
-from hsp_control.common.exceptions import FreezeError
+from hsp_control.common.errors import FreezeError
 
 _ENGINE = Path(engine.LIBRARY).parent
 _PACKAGE = Path(engine.__file__).parent

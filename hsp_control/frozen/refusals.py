@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from hsp_control.common.exceptions import FreezeError
+from hsp_control.common.errors import FreezeError
 from hsp_control.control.bound_step import BoundStep
 from hsp_control.control.compensation import Compensation
 from hsp_control.control.controller import Controller

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hsp_control.common.arrays import Array, Flags, Indices
-from hsp_control.common.exceptions import ConfigurationError, ModelError
+from hsp_control.common.errors import ConfigurationError, ModelError
 from hsp_control.geometry.links import link_shapes, self_pairs
 from hsp_control.geometry.proximity import Proximity
 from hsp_control.geometry.scene import Obstacle

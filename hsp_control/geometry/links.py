@@ -12,7 +12,7 @@ import numpy as np
 import pinocchio as pin
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import ModelError
+from hsp_control.common.errors import ModelError
 from hsp_control.common.suggestions import listing
 from hsp_control.geometry.enclosing import (
     convex_hull,

@@ -9,7 +9,7 @@ import pinocchio as pin
 
 from hsp_control import engine
 from hsp_control.common.arrays import Array, Indices
-from hsp_control.common.exceptions import FieldError
+from hsp_control.common.errors import FieldError
 from hsp_control.engine.plans import PartCall, PartCalls
 from hsp_control.geometry.closed_form import ClosedFormDistances, has_closed_form
 from hsp_control.geometry.links import LinkShape

@@ -9,7 +9,7 @@ import pinocchio as pin
 from pydantic import AfterValidator, Field
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import SceneError, TrajectoryError
+from hsp_control.common.errors import SceneError, TrajectoryError
 from hsp_control.common.suggestions import did_you_mean, listing
 from hsp_control.declaration import Part
 from hsp_control.declaration.nested import BY_NAME, parts_within, stored

@@ -17,7 +17,7 @@ import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.entry_points import own_names
-from hsp_control.common.exceptions import SceneError
+from hsp_control.common.errors import SceneError
 from hsp_control.declaration import Part
 from hsp_control.declaration.families import value_fields
 from hsp_control.declaration.quantities import (

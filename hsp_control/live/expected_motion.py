@@ -5,7 +5,7 @@ from math import exp
 import numpy as np
 
 from hsp_control.common.arrays import Array, Flags
-from hsp_control.common.exceptions import HspControlError
+from hsp_control.common.errors import HspControlError
 from hsp_control.engine import Dynamics
 from hsp_control.robot import Robot
 

@@ -7,7 +7,7 @@ from typing import Protocol, runtime_checkable
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.entry_points import entry_points
-from hsp_control.common.exceptions import HardwareError, HspControlError, LiveError
+from hsp_control.common.errors import HardwareError, HspControlError, LiveError
 from hsp_control.common.suggestions import listing, nearest
 from hsp_control.control.measurement import Measurement as Measurement
 from hsp_control.live.settings import LiveSettings

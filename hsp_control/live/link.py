@@ -33,7 +33,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import HardwareError, LiveError
+from hsp_control.common.errors import HardwareError, LiveError
 from hsp_control.common.host_names import check_host_name
 from hsp_control.common.suggestions import did_you_mean
 

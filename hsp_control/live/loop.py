@@ -11,14 +11,14 @@ import numpy as np
 import pinocchio as pin
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import FallError, LiveError
+from hsp_control.common.errors import FallError, LiveError
 from hsp_control.common.keywords import suggesting
 from hsp_control.control.compensation import CompensatedController, Compensation
 from hsp_control.control.controller import Controller
-from hsp_control.control.estimator import Estimator
+from hsp_control.control.estimation import Estimator
 from hsp_control.control.falling import FallDetector
 from hsp_control.control.first_state import warn_of_slow_efforts
-from hsp_control.control.motion_plan import MotionPlan
+from hsp_control.control.plans import MotionPlan
 from hsp_control.geometry.scene import Scene
 from hsp_control.live.effort_limiter import EffortLimiter
 from hsp_control.live.hardware import Hardware, described

@@ -5,7 +5,7 @@ import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from hsp_control.common.exceptions import SimulationError
+from hsp_control.common.errors import SimulationError
 
 
 @contextmanager

@@ -6,7 +6,7 @@ from dataclasses import KW_ONLY
 import numpy as np
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import LiveError
+from hsp_control.common.errors import LiveError
 from hsp_control.constraints.contacts import Contact
 from hsp_control.constraints.limits import RobotLimits
 from hsp_control.constraints.limits.joint_numbers import Positives, by_dof, own_maximum

@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import HspControlError, LiveError
+from hsp_control.common.errors import HspControlError, LiveError
 from hsp_control.constraints.contacts import Contact
 from hsp_control.constraints.limits import RobotLimits, own_limits
 from hsp_control.live.effort_limiter import EffortLimiter

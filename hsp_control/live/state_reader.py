@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from hsp_control.common.arrays import Array, Flags
-from hsp_control.common.exceptions import HardwareError, HspControlError
+from hsp_control.common.errors import HardwareError, HspControlError
 from hsp_control.constraints.limits import RobotLimits, own_limits
 from hsp_control.control.measurement import Inertial
 from hsp_control.engine import Dynamics

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import SimulationError
+from hsp_control.common.errors import SimulationError
 from hsp_control.declaration import Part, within
 from hsp_control.declaration.quantities import Weights
 from hsp_control.robot.robot import Robot

@@ -15,7 +15,7 @@ import pinocchio as pin
 from hsp_control import engine
 from hsp_control.common.arrays import Array
 from hsp_control.common.entry_points import own_names
-from hsp_control.common.exceptions import HspControlError, SimulationError
+from hsp_control.common.errors import HspControlError, SimulationError
 from hsp_control.declaration import Part
 from hsp_control.declaration.quantities import Positive
 from hsp_control.engine import Plan

@@ -7,7 +7,7 @@ import pinocchio as pin
 
 from hsp_control import engine
 from hsp_control.common.arrays import Array, Indices, read_only_view
-from hsp_control.common.exceptions import ImmutableError
+from hsp_control.common.errors import ImmutableError
 from hsp_control.engine.plans import PartCall, PartCalls
 
 

@@ -8,7 +8,7 @@ import pinocchio as pin
 
 from hsp_control import engine
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import ModelError
+from hsp_control.common.errors import ModelError
 from hsp_control.engine import Dynamics
 from hsp_control.engine.plans import PartCall, PartCalls
 from hsp_control.robot.dynamics import ModelNumbers, model_numbers

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import pinocchio as pin
 
-from hsp_control.common.exceptions import (
+from hsp_control.common.errors import (
     HspControlError,
     ModelError,
     RobotNotFoundError,

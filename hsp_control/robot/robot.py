@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.entry_points import entry_points
-from hsp_control.common.exceptions import ModelError
+from hsp_control.common.errors import ModelError
 from hsp_control.common.keywords import suggesting
 from hsp_control.declaration import within
 from hsp_control.robot.description.access import ANYWHERE, Access

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 
 from hsp_control import engine
 from hsp_control.common.arrays import Array, Indices, read_only_view
-from hsp_control.common.exceptions import ImmutableError, NonFiniteError, ShapeError
+from hsp_control.common.errors import ImmutableError, NonFiniteError, ShapeError
 from hsp_control.declaration.quantities import Vector
 from hsp_control.engine import Dynamics, Move, Plan
 from hsp_control.engine.plans import (

@@ -8,7 +8,7 @@ import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from hsp_control.common.arrays import Array, Flags, Indices
-from hsp_control.common.exceptions import (
+from hsp_control.common.errors import (
     ConfigurationError,
     FrameNotFoundError,
     JointNotFoundError,

@@ -5,10 +5,10 @@ from typing import Generic, Protocol, TypeVar
 
 from hsp_control.common.arrays import Array
 from hsp_control.control.controller import Controller
-from hsp_control.control.estimator import Estimator, RunningEstimator, begun
+from hsp_control.control.estimation import Estimator, RunningEstimator, begun
 from hsp_control.control.measurement import Inertial, LogChannel, Measurement
-from hsp_control.control.motion_plan import MotionPlan, RunningPlan
 from hsp_control.control.output import ControlOutput
+from hsp_control.control.plans import MotionPlan, RunningPlan
 from hsp_control.robot import RobotState
 
 

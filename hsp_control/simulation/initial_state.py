@@ -8,7 +8,7 @@ import numpy as np
 import pinocchio as pin
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import ConfigurationError, ContactError
+from hsp_control.common.errors import ConfigurationError, ContactError
 from hsp_control.constraints.contacts import Contact
 from hsp_control.control.controller import Controller
 from hsp_control.declaration import Part, within

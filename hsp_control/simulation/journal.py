@@ -36,7 +36,7 @@ from weakref import WeakSet
 import numpy as np
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import LogError
+from hsp_control.common.errors import LogError
 from hsp_control.common.regular_file import why_endless
 from hsp_control.common.unicode_text import json_text
 

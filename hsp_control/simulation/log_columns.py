@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import SimulationError
+from hsp_control.common.errors import SimulationError
 from hsp_control.constraints.limits import (
     Barrier,
     MinimumDistance,

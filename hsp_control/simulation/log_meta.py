@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from numbers import Real
 from typing import Any
 
-from hsp_control.common.exceptions import LogError
+from hsp_control.common.errors import LogError
 from hsp_control.common.suggestions import listing
 
 _Kinds = type | tuple[type, ...]

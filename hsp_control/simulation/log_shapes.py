@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import LogError
+from hsp_control.common.errors import LogError
 from hsp_control.simulation.limit_excess import POSITION, VELOCITY
 from hsp_control.simulation.log_meta import drawn_widths
 

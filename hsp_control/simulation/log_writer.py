@@ -11,14 +11,14 @@ import numpy as np
 import pinocchio as pin
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import ConfigError
+from hsp_control.common.errors import ConfigError
 from hsp_control.common.version import __version__
 from hsp_control.control.active_stack import ActiveStack
 from hsp_control.control.change import Change
 from hsp_control.control.controller import Controller
 from hsp_control.control.measurement import LogChannel
-from hsp_control.control.motion_plan import RunningPlan
 from hsp_control.control.output import ControlOutput
+from hsp_control.control.plans import RunningPlan
 from hsp_control.declaration.imported import fingerprints
 from hsp_control.declaration.nested import with_parts_replaced
 from hsp_control.declaration.plain_data import plain_data

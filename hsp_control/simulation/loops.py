@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import SimulationError
+from hsp_control.common.errors import SimulationError
 from hsp_control.control.compensation import CompensatedController
 from hsp_control.control.controller import Controller
 from hsp_control.control.measurement import LogChannel, Measurement

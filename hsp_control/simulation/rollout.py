@@ -14,7 +14,7 @@ from typing import Any, Self
 import numpy as np
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import LogError
+from hsp_control.common.errors import LogError
 from hsp_control.common.regular_file import why_endless
 from hsp_control.common.suggestions import did_you_mean, listing
 from hsp_control.common.unicode_text import json_text

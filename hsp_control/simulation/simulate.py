@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from hsp_control.common.exceptions import (
+from hsp_control.common.errors import (
     FallError,
     HspControlError,
     LogError,
@@ -20,13 +20,13 @@ from hsp_control.control.change_model import ChangeGravity, ChangePayload
 from hsp_control.control.compensation import CompensatedController, Compensation
 from hsp_control.control.compensation import check_rate as check_loop
 from hsp_control.control.controller import Controller
-from hsp_control.control.estimator import Estimator
+from hsp_control.control.estimation import Estimator
 from hsp_control.control.first_state import (
     StartWarning,
     warn_of_jump,
     warn_of_slow_efforts,
 )
-from hsp_control.control.motion_plan import MotionPlan, RunningPlan
+from hsp_control.control.plans import MotionPlan, RunningPlan
 from hsp_control.declaration import Part, within
 from hsp_control.declaration.language import check_kind
 from hsp_control.declaration.quantities import Flag, Number, Positive

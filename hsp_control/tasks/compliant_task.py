@@ -7,7 +7,7 @@ import numpy as np
 
 from hsp_control import engine
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import GainError
+from hsp_control.common.errors import GainError
 from hsp_control.declaration import within
 from hsp_control.engine.plans import PartCall, PartCalls
 from hsp_control.law import TaskSample

@@ -9,7 +9,7 @@ from pydantic import AfterValidator, BeforeValidator
 
 from hsp_control import engine
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import HspControlError, TaskError
+from hsp_control.common.errors import HspControlError, TaskError
 from hsp_control.declaration.quantities import Positive, plain
 from hsp_control.edge.threshold import WHOLE
 from hsp_control.robot import Robot

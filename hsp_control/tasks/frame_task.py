@@ -8,7 +8,7 @@ import numpy as np
 import pinocchio as pin
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import TaskError
+from hsp_control.common.errors import TaskError
 from hsp_control.declaration import within
 from hsp_control.declaration.quantities import Positive
 from hsp_control.geometry.scene import Start

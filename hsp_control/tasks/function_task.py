@@ -7,7 +7,7 @@ from typing import Annotated, Any, Self
 import numpy as np
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import TaskError
+from hsp_control.common.errors import TaskError
 from hsp_control.declaration.imported import AS_TEXT, NAMED
 from hsp_control.declaration.quantities import PositiveCount
 from hsp_control.geometry.scene import Start

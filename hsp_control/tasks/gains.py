@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import GainError
+from hsp_control.common.errors import GainError
 from hsp_control.declaration import Part
 from hsp_control.declaration.quantities import Gain
 

@@ -9,7 +9,7 @@ import pinocchio as pin
 
 from hsp_control import engine
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import TaskError
+from hsp_control.common.errors import TaskError
 from hsp_control.declaration.quantities import Vector3
 from hsp_control.engine.plans import PartCall
 from hsp_control.robot import RobotState

@@ -6,7 +6,7 @@ from typing import Self
 import pinocchio as pin
 
 from hsp_control import engine
-from hsp_control.common.exceptions import TaskError
+from hsp_control.common.errors import TaskError
 from hsp_control.declaration import within
 from hsp_control.engine.plans import CallOutput, PartCall
 from hsp_control.geometry.scene import Start

@@ -8,7 +8,7 @@ from typing import Any, ClassVar, Literal, Self
 import numpy as np
 
 from hsp_control.common.arrays import Array, Indices
-from hsp_control.common.exceptions import TaskError
+from hsp_control.common.errors import TaskError
 from hsp_control.declaration import Part, within
 from hsp_control.declaration.nested import parts_within
 from hsp_control.declaration.quantities import PositiveCount

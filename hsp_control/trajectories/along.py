@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from hsp_control import engine
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import TrajectoryError
+from hsp_control.common.errors import TrajectoryError
 from hsp_control.declaration.quantities import Number, Positive, Vector
 from hsp_control.engine import Plan
 from hsp_control.engine.plans import TIME, PartCall, PartCalls, planned

@@ -8,7 +8,7 @@ from typing import NamedTuple, Self
 import numpy as np
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import TrajectoryError
+from hsp_control.common.errors import TrajectoryError
 
 Rates = Callable[[float], tuple[Array, Array]]
 """Rates from which a path's length is computed: y = dp/du and dy/du at a parameter

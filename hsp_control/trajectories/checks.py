@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import TrajectoryError
+from hsp_control.common.errors import TrajectoryError
 from hsp_control.declaration.rotation import matrix_of
 
 _ORTHONORMAL = 1e-8  # largest entry of A Aᵀ - I that may be rounding error

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from hsp_control import engine
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import TrajectoryError
+from hsp_control.common.errors import TrajectoryError
 from hsp_control.declaration.nested import parts_within, with_parts_replaced
 from hsp_control.declaration.quantities import NonNegative, Number
 from hsp_control.engine import Plan

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from hsp_control import engine
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import TrajectoryError
+from hsp_control.common.errors import TrajectoryError
 from hsp_control.declaration.quantities import Matrix, Number, Positive, Vector, Vector3
 from hsp_control.engine.plans import PartCall
 from hsp_control.trajectories import checks

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from hsp_control import engine
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import TrajectoryError
+from hsp_control.common.errors import TrajectoryError
 from hsp_control.declaration import Part
 from hsp_control.declaration.quantities import Number, Vector, Vector3
 from hsp_control.declaration.rotation import Rotation, Rotations, matrix_of

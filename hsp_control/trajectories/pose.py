@@ -10,7 +10,7 @@ import pinocchio as pin
 
 from hsp_control import engine
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import TrajectoryError
+from hsp_control.common.errors import TrajectoryError
 from hsp_control.declaration import Part
 from hsp_control.declaration.quantities import Number, Positive, Vector3, numbers
 from hsp_control.declaration.rotation import Rotation, matrix_of

@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import AfterValidator, BeforeValidator, Field
 
 from hsp_control import engine
-from hsp_control.common.exceptions import ScheduleError
+from hsp_control.common.errors import ScheduleError
 from hsp_control.declaration import Part
 from hsp_control.declaration.quantities import NonNegative, Number, plain
 

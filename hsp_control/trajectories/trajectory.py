@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import ShapeError, TrajectoryError
+from hsp_control.common.errors import ShapeError, TrajectoryError
 from hsp_control.declaration import Part
 from hsp_control.engine.plans import TIME, PartCall, PartCalls, bind, implemented_by
 from hsp_control.trajectories.arc_length import Course

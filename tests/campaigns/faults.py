@@ -18,7 +18,7 @@ from rich.progress import Progress
 
 import hsp_control as hsp
 from campaigns.results import keep
-from hsp_control.common.exceptions import LogError
+from hsp_control.common.errors import LogError
 from hsp_control.simulation import Rollout
 
 CONFIG = "paper/4_moving_obstacle"

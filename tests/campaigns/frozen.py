@@ -20,7 +20,7 @@ from rich.progress import Progress
 import hsp_control as hsp
 from campaigns.results import keep
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import (
+from hsp_control.common.errors import (
     CompensationError,
     FreezeError,
     HspControlError,

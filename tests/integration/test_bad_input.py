@@ -10,7 +10,7 @@ import pytest
 
 import hsp_control as hsp
 from hsp_control.cli.main import main
-from hsp_control.common.exceptions import HspControlError, StreamError
+from hsp_control.common.errors import HspControlError, StreamError
 from hsp_control.control.first_state import StartWarning
 from hsp_control.trajectories import CallableTrajectory
 

@@ -17,7 +17,7 @@ from scipy.integrate import simpson
 import hsp_control as hsp
 from hsp_control import Controller, FramePose, FramePosition, Rollout
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import ControllerError
+from hsp_control.common.errors import ControllerError
 from hsp_control.control.compensation import Compensation, MomentumObserver
 from hsp_control.control.compensation.linear_loop import LinearLoop
 from hsp_control.control.gains_in_force import held_radius

@@ -10,7 +10,7 @@ import pinocchio as pin
 import pytest
 
 import hsp_control as hsp
-from hsp_control.common.exceptions import AccessError, HspControlError
+from hsp_control.common.errors import AccessError, HspControlError
 from hsp_control.simulation.log_writer import LogWriter
 from hsp_control.trajectories.streams import inbox
 

@@ -11,7 +11,7 @@ from campaigns.urdf_case import DAE, OBJ, STL
 
 from hsp_control import HspControlError, Robot, load_experiment
 from hsp_control.cli import main
-from hsp_control.common.exceptions import (
+from hsp_control.common.errors import (
     AccessError,
     ConfigError,
     LogError,

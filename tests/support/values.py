@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from hsp_control.common.exceptions import ImmutableError
+from hsp_control.common.errors import ImmutableError
 from hsp_control.declaration import Part
 from hsp_control.declaration.families import value_fields
 

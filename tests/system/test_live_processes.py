@@ -21,7 +21,7 @@ import hsp_control as hsp
 from hsp_control import Rollout
 from hsp_control.cli import main
 from hsp_control.cli.robot_process import RobotProcess
-from hsp_control.common.exceptions import HardwareError, LiveError
+from hsp_control.common.errors import HardwareError, LiveError
 from hsp_control.companions.play.steering import PageProcess
 from hsp_control.live import Faults, LiveSettings, Phase, run_loop
 

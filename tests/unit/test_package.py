@@ -7,6 +7,7 @@ import subprocess
 import sys
 from importlib import import_module
 from pathlib import Path
+from types import ModuleType
 
 import pytest
 
@@ -28,26 +29,30 @@ def imported(code: str, **environment: str) -> set[str]:
     return set(json.loads(ran.stderr.splitlines()[-1]))
 
 
-def test_types_and_names_agree() -> None:
-    """A type checker reads the names that are looked up at run time."""
-    tree = ast.parse(Path(hsp_control.__file__).read_text(encoding="utf-8"))
-    seen = {
-        name.asname or name.name: (node.module, name.name)
-        for block in tree.body
-        if isinstance(block, ast.If)
-        for node in block.body
-        if isinstance(node, ast.ImportFrom)
-        for name in node.names
-    }
-    names = {name: (room, name) for name, room in hsp_control._HOMES.items()}
-    for name, room in hsp_control._NAMESPACES.items():
-        outer, _, inner = room.rpartition(".")
-        names[name] = (outer or None, inner)
-    for name in hsp_control._companions():  # so that an editor completes hsp.plots.
-        names[name] = ("companions", name)
-    # The line of a removed companion may stay.
-    assert {k: v for k, v in seen.items() if k in names} == names
-    assert {v[0] for k, v in seen.items() if k not in names} <= {"companions"}
+STUBS = sorted(Path(hsp_control.__file__).parent.rglob("__init__.pyi"))
+
+
+@pytest.mark.parametrize("stub", STUBS, ids=lambda stub: stub.parent.name)
+def test_every_name_of_a_stub_is_there_and_is_exported(stub: Path) -> None:
+    """Editors and type checkers read what is looked up at run time."""
+    room = ".".join(
+        stub.parent.relative_to(Path(hsp_control.__file__).parents[1]).parts
+    )
+    module = import_module(room)
+    for node in ast.parse(stub.read_text(encoding="utf-8")).body:
+        assert isinstance(node, ast.ImportFrom)
+        (name,) = node.names
+        assert name.asname == name.name  # else a stub does not export it
+        if node.module != "companions" or name.name in hsp_control.companions.__all__:
+            assert name.name in dir(module)
+            assert getattr(module, name.name) is not None
+
+
+def test_the_stub_names_every_companion() -> None:
+    """So that an editor completes ``hsp.plots.``"""
+    stub = Path(hsp_control.__file__).with_suffix(".pyi").read_text(encoding="utf-8")
+    for name in hsp_control.companions.__all__:
+        assert f"from .companions import {name} as {name}\n" in stub
 
 
 def test_all_names_exist_and_are_listed() -> None:
@@ -70,8 +75,7 @@ def test_the_law_reads_alone() -> None:
 
 def test_few_names_are_at_the_top() -> None:
     """The top level has the common names; a hint points to the others."""
-    names = [name for name in hsp_control._HOMES if name not in hsp_control._NAMESPACES]
-    assert len(names) <= 45
+    assert len(hsp_control.__all__) - len(NAMESPACES) <= 45
     message = r"no attribute 'Spline'; there is hsp_control\.trajectories\.Spline$"
     with pytest.raises(AttributeError, match=message):
         _ = hsp_control.Spline
@@ -81,10 +85,16 @@ def test_few_names_are_at_the_top() -> None:
         _ = hsp_control.Trajectory
 
 
-@pytest.mark.parametrize("namespace", hsp_control._NAMESPACES)
+NAMESPACES = [
+    name
+    for name in hsp_control.__all__
+    if isinstance(getattr(hsp_control, name), ModuleType)
+]
+
+
+@pytest.mark.parametrize("namespace", NAMESPACES)
 def test_each_namespace_has_its_own_names(namespace: str) -> None:
     module = getattr(hsp_control, namespace)
-    assert module is import_module(f"hsp_control.{hsp_control._NAMESPACES[namespace]}")
     assert [name for name in vars(module) if name[0].isupper()]
     names = [name for name in dir(module) if not name.startswith("_")]
     homes = {name: getattr(module, name).__module__ for name in names}

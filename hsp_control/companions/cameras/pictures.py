@@ -24,7 +24,7 @@ import numpy as np
 from PIL import Image
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import HardwareError
+from hsp_control.common.errors import HardwareError
 from hsp_control.common.host_names import check_host_name
 from hsp_control.common.silence import Silence
 from hsp_control.common.suggestions import did_you_mean, listing

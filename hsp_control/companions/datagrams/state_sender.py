@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from hsp_control.common.exceptions import HardwareError
+from hsp_control.common.errors import HardwareError
 from hsp_control.common.host_names import check_host_name
 from hsp_control.common.suggestions import did_you_mean
 from hsp_control.companions.datagrams.targets import address_of

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 from urllib.parse import urlsplit
 from weakref import ref
 
-from hsp_control.common.exceptions import StreamError
+from hsp_control.common.errors import StreamError
 from hsp_control.common.host_names import check_host_name
 from hsp_control.common.suggestions import did_you_mean
 from hsp_control.trajectories.streams.inbox import Inbox

@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from hsp_control.common.exceptions import ExportError
+from hsp_control.common.errors import ExportError
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page

@@ -9,7 +9,7 @@ from pathlib import Path
 from tempfile import TemporaryFile
 from typing import IO
 
-from hsp_control.common.exceptions import ExportError
+from hsp_control.common.errors import ExportError
 
 _EVEN = "pad=ceil(iw/2)*2:ceil(ih/2)*2:color=white"
 _PALETTE = (

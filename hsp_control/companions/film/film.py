@@ -7,7 +7,7 @@ from tempfile import TemporaryDirectory
 from threading import Event
 from typing import Any, NamedTuple
 
-from hsp_control.common.exceptions import ExportError
+from hsp_control.common.errors import ExportError
 from hsp_control.common.suggestions import did_you_mean
 from hsp_control.companions.film.chromium import headless_browser, open_page
 from hsp_control.companions.film.encoding import FORMATS, encoder, find_ffmpeg

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import ExportError
+from hsp_control.common.errors import ExportError
 
 if TYPE_CHECKING:
     from playwright.sync_api import Page

@@ -12,7 +12,7 @@ from select import select
 from time import monotonic
 from typing import Any
 
-from hsp_control.common.exceptions import HardwareError
+from hsp_control.common.errors import HardwareError
 from hsp_control.common.silence import Silence
 from hsp_control.companions.franka import client
 from hsp_control.companions.franka.reflexes import explained

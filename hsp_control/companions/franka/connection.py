@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import HardwareError
+from hsp_control.common.errors import HardwareError
 from hsp_control.companions.franka import client
 from hsp_control.companions.franka.client_process import ClientProcess
 from hsp_control.companions.franka.hardware import FrankaHardware

@@ -7,7 +7,7 @@ from math import inf, pi
 import numpy as np
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import HardwareError
+from hsp_control.common.errors import HardwareError
 from hsp_control.companions.franka import client
 from hsp_control.companions.franka.client_process import ClientProcess
 from hsp_control.companions.franka.settings import FrankaSettings

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import HardwareError
+from hsp_control.common.errors import HardwareError
 from hsp_control.robot import Robot
 
 GRAVITY = 2.0

@@ -5,7 +5,7 @@ import argparse
 import numpy as np
 
 from hsp_control.cli.consoles import out
-from hsp_control.common.exceptions import ModelError
+from hsp_control.common.errors import ModelError
 from hsp_control.companions.franka.connection import reached
 from hsp_control.companions.franka.model_request import robot_urdf
 from hsp_control.companions.franka.robot_model import calibrated, own_model

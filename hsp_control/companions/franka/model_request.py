@@ -5,7 +5,7 @@ from time import monotonic, sleep
 
 import numpy as np
 
-from hsp_control.common.exceptions import HardwareError
+from hsp_control.common.errors import HardwareError
 from hsp_control.companions.franka.layouts import (
     CONNECTED,
     HEADER,

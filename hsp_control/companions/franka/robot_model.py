@@ -8,7 +8,7 @@ from xml.etree.ElementTree import Element
 import numpy as np
 import pinocchio as pin
 
-from hsp_control.common.exceptions import ModelError
+from hsp_control.common.errors import ModelError
 from hsp_control.robot import Robot
 from hsp_control.robot.description.access import XmlError, parse_xml
 from hsp_control.robot.description.urdf import read_urdf

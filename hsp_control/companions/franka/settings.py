@@ -9,7 +9,7 @@ import yaml
 from numpy.typing import ArrayLike
 from pydantic import Field
 
-from hsp_control.common.exceptions import LiveError
+from hsp_control.common.errors import LiveError
 from hsp_control.companions.shared import name_and_options
 from hsp_control.declaration import Part, within
 from hsp_control.declaration.quantities import (

@@ -7,7 +7,7 @@ import numpy as np
 import pinocchio as pin
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import LiveError
+from hsp_control.common.errors import LiveError
 from hsp_control.companions.franka.layouts import JOINTS
 from hsp_control.robot import Robot
 from hsp_control.robot.description.urdf import read_urdf

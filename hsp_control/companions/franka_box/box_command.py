@@ -7,7 +7,7 @@ from contextlib import nullcontext
 
 from hsp_control.cli.live_experiment import of_a_robot
 from hsp_control.cli.loading import robot_access
-from hsp_control.common.exceptions import LiveError
+from hsp_control.common.errors import LiveError
 from hsp_control.companions.franka.layouts import PERIOD, PORT, VERSION
 from hsp_control.companions.franka_box import Arm, ControlBox, Server
 from hsp_control.companions.franka_box.gripper import Gripper

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hsp_control.common.exceptions import HardwareError
+from hsp_control.common.errors import HardwareError
 from hsp_control.companions.franka.layouts import (
     COMMAND,
     CONNECTED,

@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import Self
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import LogError
+from hsp_control.common.errors import LogError
 from hsp_control.companions.franka_box import ControlBox
 from hsp_control.config import Experiment
 from hsp_control.control.interface import LogChannel

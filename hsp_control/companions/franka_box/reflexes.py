@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import ModelError
+from hsp_control.common.errors import ModelError
 from hsp_control.companions.franka.layouts import JOINTS, PERIOD, Error
 from hsp_control.companions.franka_box.arm import (
     ACCELERATION,

@@ -10,7 +10,7 @@ from typing import Self
 
 import numpy as np
 
-from hsp_control.common.exceptions import HardwareError, LiveError
+from hsp_control.common.errors import HardwareError, LiveError
 from hsp_control.companions.franka.layouts import PERIOD, PORT, MoveStatus
 from hsp_control.companions.franka_box.box import ControlBox, Say
 from hsp_control.companions.franka_box.connection import (

@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio as pin
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import ConfigurationError, ModelError
+from hsp_control.common.errors import ConfigurationError, ModelError
 from hsp_control.common.suggestions import listing
 from hsp_control.companions.inspection.finding import Finding as Finding
 from hsp_control.companions.inspection.finding import Severity

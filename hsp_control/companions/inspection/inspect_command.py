@@ -12,7 +12,7 @@ from xml.etree import ElementTree
 
 from hsp_control.cli.consoles import out, working
 from hsp_control.cli.loading import robot_access, run_imports
-from hsp_control.common.exceptions import ModelError
+from hsp_control.common.errors import ModelError
 from hsp_control.companions.inspection.findings import Inspection
 from hsp_control.companions.inspection.findings import inspect as inspect_robot
 from hsp_control.robot import RobotDescription

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from xml.etree.ElementTree import Element
 
-from hsp_control.common.exceptions import ModelError
+from hsp_control.common.errors import ModelError
 from hsp_control.common.suggestions import did_you_mean, listing
 from hsp_control.companions.inspection.finding import Finding
 from hsp_control.robot.description.access import XmlError, read_xml

@@ -25,7 +25,7 @@ import numpy as np
 import pinocchio as pin
 
 from hsp_control.common.arrays import Array, Indices
-from hsp_control.common.exceptions import ModelError
+from hsp_control.common.errors import ModelError
 from hsp_control.companions.mujoco.scene import (
     Selection,
     constants,

@@ -25,7 +25,7 @@ import numpy as np
 import pinocchio as pin
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import JointNotFoundError, ModelError
+from hsp_control.common.errors import JointNotFoundError, ModelError
 from hsp_control.common.suggestions import did_you_mean, listing
 from hsp_control.companions.mujoco.scene import Names
 from hsp_control.robot.robot import Robot

@@ -17,7 +17,7 @@ import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import AccessError, ModelError, RobotNotFoundError
+from hsp_control.common.errors import AccessError, ModelError, RobotNotFoundError
 from hsp_control.common.regular_file import why_no_file
 from hsp_control.common.suggestions import did_you_mean, listing
 from hsp_control.companions.mujoco.conversion import (

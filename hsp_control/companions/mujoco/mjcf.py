@@ -12,7 +12,7 @@ import pinocchio as pin
 from pydantic import AfterValidator, Field
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import SimulationError
+from hsp_control.common.errors import SimulationError
 from hsp_control.companions.mujoco.coordinates import (
     CONTINUOUS,
     FREE,

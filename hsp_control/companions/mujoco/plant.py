@@ -10,7 +10,7 @@ import pinocchio as pin
 
 from hsp_control import engine
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import ModelError, SimulationError
+from hsp_control.common.errors import ModelError, SimulationError
 from hsp_control.companions.mujoco import scene
 from hsp_control.companions.mujoco.carried import CarriedInMujoco
 from hsp_control.companions.mujoco.coordinates import MujocoCoordinates, joints_of

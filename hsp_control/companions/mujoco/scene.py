@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import (
+from hsp_control.common.errors import (
     FrameNotFoundError,
     JointNotFoundError,
     ModelError,

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from hsp_control.common.arrays import Array, Indices
-from hsp_control.common.exceptions import FrameNotFoundError, SimulationError
+from hsp_control.common.errors import FrameNotFoundError, SimulationError
 from hsp_control.common.suggestions import did_you_mean, listing
 from hsp_control.companions.mujoco.coordinates import MujocoCoordinates
 from hsp_control.companions.mujoco.loading import compile_mjcf

@@ -14,7 +14,7 @@ from hsp_control.cli.options import (
     add_configuration,
     add_import,
 )
-from hsp_control.common.exceptions import LiveError
+from hsp_control.common.errors import LiveError
 from hsp_control.companions.viewer.command import add_page
 
 if TYPE_CHECKING:

@@ -20,7 +20,7 @@ import numpy as np
 import pinocchio as pin
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import HspControlError, StreamError
+from hsp_control.common.errors import HspControlError, StreamError
 from hsp_control.companions.play.knobs import Knob, knobs_of
 from hsp_control.companions.plots.palette import FIELD
 from hsp_control.control.interface import DELAY, RAMP, Changes, Controller, new_stream

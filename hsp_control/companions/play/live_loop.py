@@ -9,7 +9,7 @@ from time import monotonic
 from typing import Any, Literal
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import HspControlError
+from hsp_control.common.errors import HspControlError
 from hsp_control.companions.play.handles import Handles
 from hsp_control.config import Experiment
 from hsp_control.control.interface import RAMP, Controller

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import ConfigError
+from hsp_control.common.errors import ConfigError
 from hsp_control.common.resources import bundled_configs
 from hsp_control.common.suggestions import listing
 from hsp_control.companions.play.session import ROW

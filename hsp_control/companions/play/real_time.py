@@ -12,7 +12,7 @@ from typing import Any
 
 from hsp_control.cli.consoles import out
 from hsp_control.cli.loading import own_code
-from hsp_control.common.exceptions import HspControlError, ViewerError
+from hsp_control.common.errors import HspControlError, ViewerError
 from hsp_control.companions.play.one_page import OnePage
 from hsp_control.companions.play.playable import playable_document
 from hsp_control.companions.play.session import Session

@@ -10,7 +10,7 @@ import numpy as np
 import pinocchio as pin
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import SimulationError
+from hsp_control.common.errors import SimulationError
 from hsp_control.companions.play.compared import ComparedController
 from hsp_control.companions.play.handles import Handles
 from hsp_control.companions.play.knobs import Knob

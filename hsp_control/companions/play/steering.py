@@ -18,7 +18,7 @@ from typing import Any, NamedTuple, Self
 from hsp_control.cli.consoles import out
 from hsp_control.cli.live_experiment import live_period
 from hsp_control.cli.robot_process import end_process
-from hsp_control.common.exceptions import HspControlError, ViewerError
+from hsp_control.common.errors import HspControlError, ViewerError
 from hsp_control.companions.play.handles import Handles
 from hsp_control.companions.play.live_loop import (
     Channel,

@@ -66,7 +66,7 @@ def _plot(options: argparse.Namespace) -> int:
     from hsp_control.cli.consoles import out, working
     from hsp_control.cli.loading import run_imports
     from hsp_control.common.entry_points import entry_points
-    from hsp_control.common.exceptions import PlotError
+    from hsp_control.common.errors import PlotError
     from hsp_control.companions import plots
     from hsp_control.simulation import Rollout
 

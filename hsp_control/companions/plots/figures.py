@@ -23,7 +23,7 @@ from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.lines import Line2D
 
-from hsp_control.common.exceptions import PlotError
+from hsp_control.common.errors import PlotError
 from hsp_control.common.suggestions import did_you_mean, listing
 from hsp_control.companions.plots import curves, log_series, palette
 from hsp_control.companions.plots.frames import (

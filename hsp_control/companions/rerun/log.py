@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import ExportError
+from hsp_control.common.errors import ExportError
 from hsp_control.companions.plots import palette
 from hsp_control.companions.viewer.commands import path_element
 from hsp_control.companions.viewer.motion import RunMotion

@@ -5,7 +5,7 @@ from statistics import median
 from time import monotonic
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import HardwareError
+from hsp_control.common.errors import HardwareError
 from hsp_control.common.warned import warn
 from hsp_control.companions.ros2.address import checked_name, parse
 from hsp_control.companions.ros2.joints import Joints

@@ -1,6 +1,6 @@
 """Whether Cyclone DDS is installed."""
 
-from hsp_control.common.exceptions import HardwareError
+from hsp_control.common.errors import HardwareError
 
 INSTALL = "pip install 'hsp_control[ros2]'"
 

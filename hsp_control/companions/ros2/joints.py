@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import HardwareError
+from hsp_control.common.errors import HardwareError
 from hsp_control.common.suggestions import did_you_mean
 from hsp_control.companions.ros2.messages import Header, JointState, Time
 from hsp_control.robot import Robot

@@ -34,7 +34,7 @@ from cyclonedds.pub import DataWriter
 from cyclonedds.sub import DataReader
 from cyclonedds.topic import Topic
 
-from hsp_control.common.exceptions import HardwareError
+from hsp_control.common.errors import HardwareError
 from hsp_control.common.suggestions import listing
 from hsp_control.companions.ros2.messages import TYPE_HASHES, ros_name
 

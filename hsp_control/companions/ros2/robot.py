@@ -9,7 +9,7 @@ import sys
 from collections.abc import Sequence
 
 from hsp_control.cli.live_experiment import of_a_robot, simulated_robot
-from hsp_control.common.exceptions import HspControlError
+from hsp_control.common.errors import HspControlError
 from hsp_control.companions.ros2.installed import check_installed
 from hsp_control.config.document import read_document
 from hsp_control.live import OperatorRequests

@@ -7,7 +7,7 @@ from time import monotonic, sleep, time_ns
 import numpy as np
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import HardwareError
+from hsp_control.common.errors import HardwareError
 from hsp_control.companions.ros2.address import checked_name, parse
 from hsp_control.companions.ros2.hardware import JOINT_STATES
 from hsp_control.companions.ros2.joints import Joints

@@ -9,7 +9,7 @@ from time import monotonic
 from typing import TYPE_CHECKING, Any
 from weakref import ref
 
-from hsp_control.common.exceptions import HardwareError, StreamError
+from hsp_control.common.errors import HardwareError, StreamError
 from hsp_control.companions.ros2.address import SCHEME as SCHEME
 from hsp_control.companions.ros2.address import TopicAddress, parse
 from hsp_control.companions.ros2.installed import check_installed

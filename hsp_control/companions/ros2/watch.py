@@ -3,7 +3,7 @@
 from time import time_ns
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import HardwareError
+from hsp_control.common.errors import HardwareError
 from hsp_control.companions.ros2.address import checked_name, parse
 from hsp_control.companions.ros2.joints import Joints
 from hsp_control.companions.ros2.messages import (

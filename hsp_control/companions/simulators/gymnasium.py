@@ -12,7 +12,7 @@ import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import ControllerError, ShapeError
+from hsp_control.common.errors import ControllerError, ShapeError
 from hsp_control.companions.mujoco.plant import import_mujoco
 from hsp_control.companions.mujoco.scene_plant import MujocoScenePlant
 from hsp_control.companions.simulators.hand_control import HandControl

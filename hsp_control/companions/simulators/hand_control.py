@@ -8,7 +8,7 @@ import numpy as np
 import pinocchio as pin
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import NonFiniteError
+from hsp_control.common.errors import NonFiniteError
 from hsp_control.companions.simulators.hand_settings import Source, read_settings
 from hsp_control.companions.simulators.held_goal import HeldPoint, HeldRotation
 from hsp_control.control.interface import CompensatedController, Controller

@@ -6,7 +6,7 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from hsp_control.common.exceptions import ConfigError
+from hsp_control.common.errors import ConfigError
 from hsp_control.config.document import Document
 from hsp_control.config.loaded_scenario import located_scene, validate
 from hsp_control.config.scenario import NullSpaceSettings

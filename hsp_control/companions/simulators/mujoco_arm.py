@@ -5,7 +5,7 @@ from typing import Any
 
 from numpy.typing import ArrayLike
 
-from hsp_control.common.exceptions import FrameNotFoundError, ModelError
+from hsp_control.common.errors import FrameNotFoundError, ModelError
 from hsp_control.common.suggestions import did_you_mean, listing
 from hsp_control.companions.mujoco.scene import Names
 from hsp_control.robot import Robot

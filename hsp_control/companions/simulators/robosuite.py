@@ -18,7 +18,7 @@ import numpy as np
 import pinocchio as pin
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import ControllerError, GainError
+from hsp_control.common.errors import ControllerError, GainError
 from hsp_control.companions.mujoco import MujocoCoordinates
 from hsp_control.companions.mujoco.scene import Names, joint_actuators, motor
 from hsp_control.companions.simulators.hand_control import HandControl

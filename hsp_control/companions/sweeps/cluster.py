@@ -9,7 +9,7 @@ from contextlib import contextmanager, suppress
 from time import monotonic
 from typing import TYPE_CHECKING, Any
 
-from hsp_control.common.exceptions import SweepError
+from hsp_control.common.errors import SweepError
 
 if TYPE_CHECKING:
     from distributed import Client

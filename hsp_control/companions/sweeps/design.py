@@ -7,7 +7,7 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 
-from hsp_control.common.exceptions import SweepError
+from hsp_control.common.errors import SweepError
 from hsp_control.common.suggestions import did_you_mean, listing
 from hsp_control.companions.sweeps.factor import Factor
 from hsp_control.companions.sweeps.values import quantiles

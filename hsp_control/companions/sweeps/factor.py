@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from hsp_control.common.exceptions import SweepError
+from hsp_control.common.errors import SweepError
 from hsp_control.companions.sweeps.values import Values, is_distribution, parsed
 from hsp_control.declaration.located import split_assignment, written
 

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullLocator
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import PlotError
+from hsp_control.common.errors import PlotError
 from hsp_control.common.suggestions import did_you_mean, listing
 from hsp_control.companions.plots import palette
 from hsp_control.companions.plots.curves import literal_text

@@ -19,7 +19,7 @@ from uuid import uuid4
 from distributed import WorkerPlugin
 
 from hsp_control.common.entry_points import entry_points
-from hsp_control.common.exceptions import SweepError
+from hsp_control.common.errors import SweepError
 from hsp_control.common.resources import is_file
 from hsp_control.companions.sweeps.plan import SweepPlan, changed, fingerprint
 from hsp_control.config import Experiment

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from time import perf_counter, sleep
 from typing import Any, NamedTuple
 
-from hsp_control.common.exceptions import HspControlError, SimulationError, SweepError
+from hsp_control.common.errors import HspControlError, SimulationError, SweepError
 from hsp_control.companions.sweeps.plan import Changes
 from hsp_control.simulation import Rollout
 from hsp_control.simulation.measures import Measure, measures

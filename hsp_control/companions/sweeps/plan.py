@@ -7,7 +7,7 @@ from copy import deepcopy
 from dataclasses import dataclass
 from typing import Any, TypeAlias
 
-from hsp_control.common.exceptions import HspControlError
+from hsp_control.common.errors import HspControlError
 from hsp_control.companions.sweeps.factor import Factor
 from hsp_control.config import Experiment
 from hsp_control.config.document import Document

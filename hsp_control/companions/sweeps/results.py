@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from hsp_control.common.exceptions import SweepError
+from hsp_control.common.errors import SweepError
 from hsp_control.common.suggestions import did_you_mean, listing
 from hsp_control.companions.sweeps.plan import changed
 from hsp_control.config.document import Document

@@ -18,7 +18,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from hsp_control.common.exceptions import SweepError
+from hsp_control.common.errors import SweepError
 from hsp_control.common.regular_file import check_ends
 from hsp_control.common.suggestions import did_you_mean
 from hsp_control.companions.sweeps.one_run import CRASHED, TIMED_OUT, Row

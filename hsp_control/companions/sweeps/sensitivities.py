@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import SweepError
+from hsp_control.common.errors import SweepError
 from hsp_control.common.suggestions import did_you_mean, listing
 from hsp_control.companions.sweeps.results import Column, Sweep
 

@@ -22,7 +22,7 @@ from rich.table import Table
 from hsp_control.cli.consoles import errors, out
 from hsp_control.cli.interrupts import INTERRUPTED
 from hsp_control.cli.loading import load
-from hsp_control.common.exceptions import SweepError
+from hsp_control.common.errors import SweepError
 from hsp_control.companions.sweeps import Sensitivity, Sweep, sensitivity
 from hsp_control.companions.sweeps import sweep as run_sweep
 

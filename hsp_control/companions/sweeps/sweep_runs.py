@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hsp_control.common.exceptions import SweepError
+from hsp_control.common.errors import SweepError
 from hsp_control.common.keywords import suggesting
 from hsp_control.companions.sweeps.design import chosen_design, points
 from hsp_control.companions.sweeps.factor import factors

@@ -12,7 +12,7 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import SweepError
+from hsp_control.common.errors import SweepError
 from hsp_control.common.suggestions import did_you_mean
 from hsp_control.config.yaml_reader import YamlError, read_yaml
 

@@ -5,7 +5,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from hsp_control.common.exceptions import ExportError
+from hsp_control.common.errors import ExportError
 from hsp_control.common.unicode_text import utf8
 from hsp_control.companions.viewer.commands import Json
 from hsp_control.companions.viewer.comparison import (

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from hsp_control.common.exceptions import HspControlError, LogError, ViewerError
+from hsp_control.common.errors import HspControlError, LogError, ViewerError
 from hsp_control.companions.viewer.clip import Clip, bands_of, extend_clip, set_clip
 from hsp_control.companions.viewer.commands import set_status
 from hsp_control.companions.viewer.motion import COARSEST, RunMotion, motion_of

@@ -10,7 +10,7 @@ import numpy as np
 import pinocchio as pin
 
 from hsp_control.common.arrays import Array, Indices
-from hsp_control.common.exceptions import SceneError
+from hsp_control.common.errors import SceneError
 from hsp_control.companions.plots.palette import MUTED, OBSTACLE, SOLID
 from hsp_control.companions.viewer import threejs
 from hsp_control.companions.viewer.commands import (

@@ -13,7 +13,7 @@ import umsgpack  # type: ignore[import-untyped]
 from numpy.typing import ArrayLike, NDArray
 
 from hsp_control.common.arrays import Array, Indices
-from hsp_control.common.exceptions import ExportError
+from hsp_control.common.errors import ExportError
 from hsp_control.companions.viewer.commands import Json, typed_array
 from hsp_control.companions.viewer.mesh_files import with_files
 from hsp_control.companions.viewer.threejs import material, matrix, unique_name

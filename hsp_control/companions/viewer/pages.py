@@ -17,7 +17,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 from hsp_control.cli.consoles import errors, out, working
 from hsp_control.cli.interrupts import end_in_order
 from hsp_control.cli.loading import run_imports
-from hsp_control.common.exceptions import ExportError, HspControlError, ViewerError
+from hsp_control.common.errors import ExportError, HspControlError, ViewerError
 from hsp_control.common.keywords import suggesting
 from hsp_control.companions.viewer import (
     ComparedRun,

@@ -6,7 +6,7 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from hsp_control.common.exceptions import AccessError, HspControlError, ViewerError
+from hsp_control.common.errors import AccessError, HspControlError, ViewerError
 from hsp_control.companions.viewer.comparison import ComparedRun
 from hsp_control.companions.viewer.offline_page import HEIGHT, InlineView
 from hsp_control.companions.viewer.transport import SceneRecorder

@@ -10,7 +10,7 @@ import numpy as np
 import pinocchio as pin
 
 from hsp_control.common.arrays import Array, Indices
-from hsp_control.common.exceptions import ModelError, RobotNotFoundError
+from hsp_control.common.errors import ModelError, RobotNotFoundError
 from hsp_control.companions.plots.palette import JOINT, LINK
 from hsp_control.companions.viewer import threejs
 from hsp_control.companions.viewer.commands import (

@@ -17,7 +17,7 @@ from ipaddress import ip_address
 from pathlib import Path
 from typing import Any
 
-from hsp_control.common.exceptions import ViewerError
+from hsp_control.common.errors import ViewerError
 from hsp_control.companions.viewer.commands import (
     LatestCommands,
     PageCommand,

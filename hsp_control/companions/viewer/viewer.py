@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio as pin
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import ExportError, LogError, ViewerError
+from hsp_control.common.errors import ExportError, LogError, ViewerError
 from hsp_control.companions.viewer import transport
 from hsp_control.companions.viewer.clip import bands_of, remove_clip, set_clip
 from hsp_control.companions.viewer.commands import (

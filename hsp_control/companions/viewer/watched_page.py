@@ -12,7 +12,7 @@ from time import monotonic, sleep
 from typing import Any
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import HspControlError
+from hsp_control.common.errors import HspControlError
 from hsp_control.companions.viewer.commands import set_status
 from hsp_control.companions.viewer.live_picture import FRAME, Picture
 from hsp_control.companions.viewer.pages import draw_empty

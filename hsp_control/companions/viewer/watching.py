@@ -12,7 +12,7 @@ from tempfile import TemporaryDirectory
 from typing import Any, Self
 from weakref import finalize
 
-from hsp_control.common.exceptions import HspControlError, ViewerError
+from hsp_control.common.errors import HspControlError, ViewerError
 from hsp_control.companions.viewer.transport import LOOPBACK, open_browser
 from hsp_control.config import Recorder
 from hsp_control.config.scenario import ViewSettings

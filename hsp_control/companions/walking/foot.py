@@ -4,7 +4,7 @@ import numpy as np
 import pinocchio as pin
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import PlanError
+from hsp_control.common.errors import PlanError
 from hsp_control.companions.walking.contact_switch import Switch, Switched
 from hsp_control.companions.walking.footsteps import Footstep, near
 from hsp_control.companions.walking.planned_references import Fed, FedOrientation

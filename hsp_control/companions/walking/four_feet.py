@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import FallError, PlanError
+from hsp_control.common.errors import FallError, PlanError
 from hsp_control.common.suggestions import listing
 from hsp_control.companions.walking.contact_switch import Switch, Switched
 from hsp_control.companions.walking.footsteps import Footstep, Velocity

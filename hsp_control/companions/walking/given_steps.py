@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from hsp_control.common.exceptions import PlanError
+from hsp_control.common.errors import PlanError
 from hsp_control.companions.walking.biped import BipedPlan
 from hsp_control.companions.walking.footsteps import Footstep, Stance, Velocity, between
 from hsp_control.companions.walking.step_planner import Next, StepPlanner

@@ -3,7 +3,7 @@
 import numpy as np
 import pinocchio as pin
 
-from hsp_control.common.exceptions import PlanError
+from hsp_control.common.errors import PlanError
 from hsp_control.robot import Robot, RobotState
 
 

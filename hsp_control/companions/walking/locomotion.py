@@ -5,7 +5,7 @@ from typing import Self
 
 import numpy as np
 
-from hsp_control.common.exceptions import PlanError
+from hsp_control.common.errors import PlanError
 from hsp_control.companions.walking.footsteps import Velocity
 from hsp_control.control.interface import MotionPlan
 from hsp_control.declaration import within

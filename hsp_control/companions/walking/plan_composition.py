@@ -4,7 +4,7 @@ from collections.abc import Collection, Sequence
 from dataclasses import replace
 from typing import Any
 
-from hsp_control.common.exceptions import PlanError
+from hsp_control.common.errors import PlanError
 from hsp_control.companions.walking.contact_switch import Switch
 from hsp_control.companions.walking.planned_references import Fed, FedOrientation
 from hsp_control.constraints.contacts import Contact

@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike
 
 from hsp_control import engine
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import TrajectoryError
+from hsp_control.common.errors import TrajectoryError
 from hsp_control.companions.walking.written_part import Written
 from hsp_control.declaration.quantities import PositiveCount
 from hsp_control.engine.plans import PartCall

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import KW_ONLY, replace
 from typing import ClassVar
 
-from hsp_control.common.exceptions import PlanError
+from hsp_control.common.errors import PlanError
 from hsp_control.common.suggestions import did_you_mean, listing
 from hsp_control.companions.walking.footsteps import Velocity
 from hsp_control.companions.walking.legs import leg_freedoms, root_frame

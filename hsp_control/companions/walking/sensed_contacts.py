@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import Field
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import PlanError
+from hsp_control.common.errors import PlanError
 from hsp_control.common.suggestions import did_you_mean, listing
 from hsp_control.companions.walking.contact_switch import Switch, Switched
 from hsp_control.constraints.contacts import Contact

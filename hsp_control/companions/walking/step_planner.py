@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import PlanError
+from hsp_control.common.errors import PlanError
 from hsp_control.companions.walking.biped import BipedPlan
 from hsp_control.companions.walking.foot import Foot
 from hsp_control.companions.walking.footsteps import Footstep, Stance, Velocity, between

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from pydantic import AfterValidator
 
 from hsp_control.common.arrays import Array, Indices
-from hsp_control.common.exceptions import ContactError, TrajectoryError
+from hsp_control.common.errors import ContactError, TrajectoryError
 from hsp_control.declaration import Part, within
 from hsp_control.declaration.nested import parts_within
 from hsp_control.declaration.quantities import (

@@ -9,7 +9,7 @@ from pydantic import AfterValidator
 
 from hsp_control import engine
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import ContactError
+from hsp_control.common.errors import ContactError
 from hsp_control.constraints.contacts.contact import NORMAL, WRENCH, Contact
 from hsp_control.declaration import within
 from hsp_control.declaration.quantities import Points, Positive, Vector3, read_only

@@ -13,7 +13,7 @@ from pydantic import AfterValidator, Field
 
 from hsp_control import engine
 from hsp_control.common.arrays import Array, Indices
-from hsp_control.common.exceptions import LimitError
+from hsp_control.common.errors import LimitError
 from hsp_control.declaration import Part
 from hsp_control.declaration.quantities import Names, NonNegative, Number
 from hsp_control.engine.plans import OnlyIf, PartCall, PartCalls, implemented_by

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 from pydantic import BeforeValidator, Field
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import HspControlError, LimitError
+from hsp_control.common.errors import HspControlError, LimitError
 from hsp_control.declaration import Part, within
 from hsp_control.declaration.quantities import ArrayField, Number, Positive, plain
 from hsp_control.robot import Robot

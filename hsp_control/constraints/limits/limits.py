@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import AfterValidator, BeforeValidator
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import LimitError
+from hsp_control.common.errors import LimitError
 from hsp_control.constraints.limits.acceleration_bounds import MotionLimits
 from hsp_control.constraints.limits.barriers import Barrier, StaticEffort
 from hsp_control.constraints.limits.joint_numbers import (

@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import KW_ONLY, replace
 from typing import Any, Literal
 
-from hsp_control.common.exceptions import CompensationError
+from hsp_control.common.errors import CompensationError
 from hsp_control.constraints.contacts import Contact
 from hsp_control.control.compensation.automatic_observer import (
     automatic_observer,

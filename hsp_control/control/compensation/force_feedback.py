@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import CompensationError
+from hsp_control.common.errors import CompensationError
 from hsp_control.common.suggestions import did_you_mean, listing
 from hsp_control.constraints.contacts import Contact
 from hsp_control.constraints.contacts.contact import NORMAL

@@ -7,7 +7,7 @@ import numpy as np
 
 from hsp_control import engine
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import CompensationError, SimulationError
+from hsp_control.common.errors import CompensationError, SimulationError
 from hsp_control.control.active_stack import ActiveStack
 from hsp_control.control.compensation.stage import Run, Stage
 from hsp_control.control.measurement import LogChannel

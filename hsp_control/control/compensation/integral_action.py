@@ -8,7 +8,7 @@ import numpy as np
 
 from hsp_control import engine
 from hsp_control.common.arrays import Array, Indices
-from hsp_control.common.exceptions import CompensationError, GainError
+from hsp_control.common.errors import CompensationError, GainError
 from hsp_control.common.suggestions import did_you_mean, listing
 from hsp_control.common.warned import warn
 from hsp_control.control.actuation import Status

@@ -25,7 +25,7 @@ import numpy as np
 
 from hsp_control import engine
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import CompensationError
+from hsp_control.common.errors import CompensationError
 from hsp_control.constraints.limits.joint_numbers import Positives, by_dof
 from hsp_control.control.active_stack import ActiveStack
 from hsp_control.control.compensation.stage import Alone, AloneCalls, Run, Stage

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import CompensationError
+from hsp_control.common.errors import CompensationError
 from hsp_control.control.compensation.stage import Run, Stage
 from hsp_control.control.controller import Controller
 from hsp_control.declaration import Part

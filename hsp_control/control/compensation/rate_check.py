@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import CompensationError, UnstableRateError
+from hsp_control.common.errors import CompensationError, UnstableRateError
 from hsp_control.control.compensation.compensation import Compensation
 from hsp_control.control.compensation.linear_loop import (
     NO_GAINS,

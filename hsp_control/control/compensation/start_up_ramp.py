@@ -6,7 +6,7 @@ import numpy as np
 
 from hsp_control import engine
 from hsp_control.common.arrays import Array, Indices
-from hsp_control.common.exceptions import CompensationError
+from hsp_control.common.errors import CompensationError
 from hsp_control.control.active_stack import ActiveStack
 from hsp_control.control.compensation.stage import Alone, AloneCalls, Run, Stage
 from hsp_control.declaration import Part

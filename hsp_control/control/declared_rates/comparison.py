@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import RateError
+from hsp_control.common.errors import RateError
 from hsp_control.robot import RobotState
 
 INTERVAL = 5e-5

@@ -11,7 +11,7 @@ from pydantic import AfterValidator
 
 from hsp_control import engine
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import FieldError, SceneError
+from hsp_control.common.errors import FieldError, SceneError
 from hsp_control.common.suggestions import did_you_mean, listing
 from hsp_control.declaration import within
 from hsp_control.declaration.quantities import Name, Names, OrInstance, Positive

@@ -8,7 +8,7 @@ import numpy as np
 
 from hsp_control import engine
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import FieldError
+from hsp_control.common.errors import FieldError
 from hsp_control.declaration.imported import AS_TEXT, NAMED
 from hsp_control.engine.plans import PartCall, PartCalls, implemented_by
 from hsp_control.law import FieldSample, MetricSample

@@ -12,7 +12,7 @@ from pydantic import AfterValidator, InstanceOf
 
 from hsp_control import engine
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import FieldError
+from hsp_control.common.errors import FieldError
 from hsp_control.declaration import Part, within
 from hsp_control.declaration.quantities import NonNegative, OrInstance
 from hsp_control.engine.plans import AnyCall, PartCall, PartCalls, implemented_by

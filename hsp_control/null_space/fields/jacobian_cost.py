@@ -11,7 +11,7 @@ import numpy as np
 
 from hsp_control import engine
 from hsp_control.common.arrays import Array, Indices
-from hsp_control.common.exceptions import FieldError
+from hsp_control.common.errors import FieldError
 from hsp_control.declaration import within
 from hsp_control.declaration.quantities import Axes
 from hsp_control.engine.plans import PartCall, PartCalls

@@ -9,7 +9,7 @@ from pydantic import Field
 
 from hsp_control import engine
 from hsp_control.common.arrays import Array, Indices
-from hsp_control.common.exceptions import FieldError
+from hsp_control.common.errors import FieldError
 from hsp_control.declaration import within
 from hsp_control.declaration.quantities import Fraction, Names, Weights
 from hsp_control.engine.plans import PartCall

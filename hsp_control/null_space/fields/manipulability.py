@@ -6,7 +6,7 @@ from typing import Literal, Self
 import numpy as np
 
 from hsp_control import engine
-from hsp_control.common.exceptions import FieldError
+from hsp_control.common.errors import FieldError
 from hsp_control.declaration import within
 from hsp_control.declaration.quantities import Matrix, Positive
 from hsp_control.engine.plans import PartCall

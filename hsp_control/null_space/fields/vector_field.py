@@ -8,7 +8,7 @@ from typing import Annotated, ClassVar
 import numpy as np
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import FieldError
+from hsp_control.common.errors import FieldError
 from hsp_control.declaration.imported import AS_TEXT, NAMED
 from hsp_control.law import FieldSample, MetricSample
 from hsp_control.null_space.fields.field import NullSpaceField

@@ -9,7 +9,7 @@ from pydantic import InstanceOf
 
 from hsp_control import engine
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import FieldError
+from hsp_control.common.errors import FieldError
 from hsp_control.declaration import Part
 from hsp_control.declaration.quantities import NonNegative, Number, Positive
 from hsp_control.engine.plans import PartCall, PartCalls, implemented_by

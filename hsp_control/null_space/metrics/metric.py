@@ -11,7 +11,7 @@ from pydantic import Field
 
 from hsp_control import engine
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import MetricError
+from hsp_control.common.errors import MetricError
 from hsp_control.declaration import Part, within
 from hsp_control.declaration.quantities import (
     ArrayField,

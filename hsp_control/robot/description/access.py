@@ -17,7 +17,7 @@ from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 from xml.parsers import expat
 
-from hsp_control.common.exceptions import AccessError
+from hsp_control.common.errors import AccessError
 from hsp_control.common.regular_file import check_ends
 from hsp_control.common.resources import bundled, config_folders
 

@@ -11,7 +11,7 @@ import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from hsp_control.common.arrays import Array, Indices
-from hsp_control.common.exceptions import ModelError
+from hsp_control.common.errors import ModelError
 from hsp_control.robot.description.joint_data import joint_data
 from hsp_control.robot.description.loading import completed
 from hsp_control.robot.description.robot_description import ToolFrame

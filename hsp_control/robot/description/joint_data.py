@@ -6,7 +6,7 @@ import numpy as np
 import pinocchio as pin
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import ModelError
+from hsp_control.common.errors import ModelError
 
 TURNING = "JointModelRevoluteUnboundedUnaligned"
 _KNOWN = {

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from urllib.parse import unquote
 
-from hsp_control.common.exceptions import AccessError
+from hsp_control.common.errors import AccessError
 from hsp_control.common.regular_file import why_endless
 from hsp_control.common.resources import is_file
 from hsp_control.robot.description.access import (

@@ -17,7 +17,7 @@ from xml.etree.ElementTree import Element, SubElement
 
 import pinocchio as pin
 
-from hsp_control.common.exceptions import ModelError
+from hsp_control.common.errors import ModelError
 from hsp_control.common.suggestions import did_you_mean
 
 _SINGLE = ("revolute", "continuous", "prismatic")

@@ -18,7 +18,7 @@ import pinocchio as pin
 from numpy.typing import ArrayLike
 from pydantic import Field
 
-from hsp_control.common.exceptions import JointNotFoundError, ModelError
+from hsp_control.common.errors import JointNotFoundError, ModelError
 from hsp_control.common.suggestions import did_you_mean, listing
 from hsp_control.declaration.quantities import ArrayField, NonNegative, ReadOnlyDict
 from hsp_control.robot.description.sources import RobotSource

@@ -15,7 +15,7 @@ from tempfile import TemporaryDirectory
 from typing import Any, NamedTuple
 from xml.etree.ElementTree import Element
 
-from hsp_control.common.exceptions import ModelError
+from hsp_control.common.errors import ModelError
 from hsp_control.common.resources import is_file
 from hsp_control.common.suggestions import listing
 from hsp_control.robot.description.access import XmlError, parse_xml

@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio as pin
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import ModelError
+from hsp_control.common.errors import ModelError
 from hsp_control.robot.description.joint_data import TURNING, joint_data, pose_numbers
 from hsp_control.robot.description.sources import BodyShape
 

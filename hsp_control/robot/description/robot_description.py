@@ -5,7 +5,7 @@ from dataclasses import KW_ONLY, field, replace
 from pathlib import Path
 from typing import Annotated, Self, get_args
 
-from hsp_control.common.exceptions import ModelError
+from hsp_control.common.errors import ModelError
 from hsp_control.common.resources import is_file
 from hsp_control.common.suggestions import did_you_mean
 from hsp_control.declaration import Part, within

@@ -6,7 +6,7 @@ position beyond them can be commanded.
 
 from xml.etree.ElementTree import Element
 
-from hsp_control.common.exceptions import ModelError
+from hsp_control.common.errors import ModelError
 
 
 def write_soft_limits(robot: Element) -> None:

@@ -17,7 +17,7 @@ from typing import Any, Literal
 import yaml
 
 from hsp_control.common.arrays import Array, Indices
-from hsp_control.common.exceptions import AccessError, ModelError, RobotNotFoundError
+from hsp_control.common.errors import AccessError, ModelError, RobotNotFoundError
 from hsp_control.common.regular_file import check_ends
 from hsp_control.common.resources import bundled_robots, is_file, is_folder
 from hsp_control.common.suggestions import did_you_mean, listing

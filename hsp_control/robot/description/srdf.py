@@ -3,7 +3,7 @@
 from collections.abc import Collection
 from pathlib import Path
 
-from hsp_control.common.exceptions import ModelError
+from hsp_control.common.errors import ModelError
 from hsp_control.robot.description.access import XmlError, read_xml
 from hsp_control.robot.description.sources import RobotSource
 

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
-from hsp_control.common.exceptions import ModelError, RobotNotFoundError
+from hsp_control.common.errors import ModelError, RobotNotFoundError
 from hsp_control.common.suggestions import listing
 from hsp_control.robot.description.access import XmlError, parse_xml, read_xml
 from hsp_control.robot.description.inertias import ENTRIES

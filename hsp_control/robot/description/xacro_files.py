@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from hsp_control.common.exceptions import ModelError
+from hsp_control.common.errors import ModelError
 from hsp_control.common.regular_file import check_ends
 from hsp_control.common.suggestions import did_you_mean
 from hsp_control.robot.description.access import MAX_SIZE, XmlError, read_xml

@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import AfterValidator
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import SimulationError
+from hsp_control.common.errors import SimulationError
 from hsp_control.declaration import within
 from hsp_control.declaration.by_type import ByType
 from hsp_control.declaration.quantities import NonNegative, Periods, Share, Weights

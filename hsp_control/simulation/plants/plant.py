@@ -9,7 +9,7 @@ from typing import Any, ClassVar, Self, TypeVar
 import numpy as np
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import SimulationError
+from hsp_control.common.errors import SimulationError
 from hsp_control.control.measurement import NO_WRENCHES, Inertial, LogChannel
 from hsp_control.declaration import Part
 from hsp_control.engine import Dynamics

@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import AfterValidator, GetJsonSchemaHandler
 from pydantic_core import CoreSchema
 
-from hsp_control.common.exceptions import SimulationError
+from hsp_control.common.errors import SimulationError
 from hsp_control.declaration import AnyOf, Part, within
 from hsp_control.declaration.families import Declared
 from hsp_control.declaration.quantities import Count, Weights

@@ -6,7 +6,7 @@ import numpy as np
 import pinocchio as pin
 
 from hsp_control.common.arrays import Array, matrix_view
-from hsp_control.common.exceptions import SimulationError
+from hsp_control.common.errors import SimulationError
 from hsp_control.declaration import Part, within
 from hsp_control.declaration.quantities import Number, Positive, Vector3
 from hsp_control.robot import Robot

@@ -7,7 +7,7 @@ import numpy as np
 
 from hsp_control import engine
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import SimulationError
+from hsp_control.common.errors import SimulationError
 from hsp_control.engine import Dynamics
 from hsp_control.robot import Robot, RobotState
 from hsp_control.robot.friction import JointFriction

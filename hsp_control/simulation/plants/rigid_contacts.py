@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import Field
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import SimulationError
+from hsp_control.common.errors import SimulationError
 from hsp_control.control.measurement import LogChannel
 from hsp_control.declaration import Part, within
 from hsp_control.declaration.nested import BY_FRAME, stored_by_frame

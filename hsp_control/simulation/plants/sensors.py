@@ -11,7 +11,7 @@ import pinocchio as pin
 from pydantic import AfterValidator
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import SimulationError
+from hsp_control.common.errors import SimulationError
 from hsp_control.control.measurement import Inertial
 from hsp_control.declaration import within
 from hsp_control.declaration.by_type import ByType

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import TrajectoryError
+from hsp_control.common.errors import TrajectoryError
 
 PLANNED = 0.95
 """Share of an angular speed up to which motions are planned; see `angular_bounds`."""

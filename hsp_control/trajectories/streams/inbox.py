@@ -9,7 +9,7 @@ from math import inf
 from threading import Lock
 from typing import Any, NamedTuple, Self
 
-from hsp_control.common.exceptions import StreamError
+from hsp_control.common.errors import StreamError
 from hsp_control.trajectories.streams.message import Message, Space, message_of
 
 _log = logging.getLogger(__name__)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hsp_control.common.arrays import Array, Indices
-from hsp_control.common.exceptions import StreamError
+from hsp_control.common.errors import StreamError
 
 MOST_WAYPOINTS = 1000  # maximum number of waypoints of one message
 LARGEST = 1e6

@@ -18,7 +18,7 @@ import numpy as np
 
 from hsp_control import engine
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import StreamError
+from hsp_control.common.errors import StreamError
 from hsp_control.engine.plans import TIME, PartCall, PartCalls
 from hsp_control.trajectories.streams.bounds import MotionBounds
 from hsp_control.trajectories.streams.chart import Chart, State

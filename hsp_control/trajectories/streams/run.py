@@ -9,7 +9,7 @@ from typing import Any
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from hsp_control.common.exceptions import StreamError
+from hsp_control.common.errors import StreamError
 from hsp_control.trajectories.streams.chart import Chart, State
 from hsp_control.trajectories.streams.inbox import Inbox, Reader
 from hsp_control.trajectories.streams.message import Axes, Space

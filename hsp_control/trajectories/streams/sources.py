@@ -7,7 +7,7 @@ from typing import Any, Protocol
 from weakref import WeakValueDictionary, ref
 
 from hsp_control.common.entry_points import entry_points
-from hsp_control.common.exceptions import StreamError
+from hsp_control.common.errors import StreamError
 from hsp_control.common.regular_file import why_endless
 from hsp_control.trajectories.streams.inbox import Inbox
 from hsp_control.trajectories.streams.message import Message, Space, message_of, parsed

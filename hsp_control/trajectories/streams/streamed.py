@@ -8,7 +8,7 @@ from typing import Annotated, Any, ClassVar, Literal, NoReturn, Self
 
 from pydantic import AfterValidator
 
-from hsp_control.common.exceptions import StreamError, TrajectoryError
+from hsp_control.common.errors import StreamError, TrajectoryError
 from hsp_control.declaration.part import Part
 from hsp_control.declaration.quantities import NonNegative, Positive
 from hsp_control.trajectories.streams.bounds import MotionBounds

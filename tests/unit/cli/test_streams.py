@@ -9,7 +9,7 @@ import pytest
 from places import covering
 
 from hsp_control import load_experiment
-from hsp_control.common.exceptions import (
+from hsp_control.common.errors import (
     ConfigError,
     LogError,
     StreamError,

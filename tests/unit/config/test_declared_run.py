@@ -9,7 +9,7 @@ import pinocchio as pin
 import pytest
 
 import hsp_control as hsp
-from hsp_control.common.exceptions import ConfigError
+from hsp_control.common.errors import ConfigError
 from hsp_control.live import InProcessRobot, OperatorRequests, SimulatedRobot
 
 ROBOT = hsp.Robot.load("planar3r")

@@ -7,7 +7,7 @@ import pytest
 from scenario_document import GOOD, Gains, Scenario, message
 from wording import wording
 
-from hsp_control.common.exceptions import FrameNotFoundError
+from hsp_control.common.errors import FrameNotFoundError
 from hsp_control.config.document import Document
 from hsp_control.config.loaded_scenario import validate
 from hsp_control.declaration.language import in_yaml

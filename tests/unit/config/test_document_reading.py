@@ -8,7 +8,7 @@ import pytest
 from scenario_document import GOOD, message
 from wording import wording
 
-from hsp_control.common.exceptions import ConfigError
+from hsp_control.common.errors import ConfigError
 from hsp_control.config import yaml_reader
 from hsp_control.config.document import Document
 from hsp_control.config.yaml_reader import MAX_SIZE

@@ -20,7 +20,7 @@ from hsp_control import (
     load_experiment,
     metrics,
 )
-from hsp_control.common import exceptions
+from hsp_control.common import errors
 from hsp_control.common.resources import bundled_configs
 
 MOVING = "paper/4_moving_obstacle"
@@ -110,7 +110,7 @@ def test_limits_that_are_all_commented_out_are_not_none(tmp_path: Path) -> None:
     file = tmp_path / "mine.yaml"
     lines = yaml.safe_dump(PANDA).splitlines()
     file.write_text("\n".join([*lines, "limits:", "#  effort: 9"]))
-    with pytest.raises(exceptions.ConfigError) as raised:
+    with pytest.raises(errors.ConfigError) as raised:
         load_experiment(file)
     reported = f"{file}:{len(lines) + 1}: limits: nothing ... none ... robot's own"
     assert re.search(wording(reported), str(raised.value))
@@ -204,7 +204,7 @@ def test_every_mistake_is_named(
 ) -> None:
     file = tmp_path / "mine.yaml"
     file.write_text(yaml.safe_dump(changed(path, value), sort_keys=False))
-    with pytest.raises(getattr(exceptions, error)) as caught:
+    with pytest.raises(getattr(errors, error)) as caught:
         load_experiment(file)
     assert re.search(wording(f"... {message}"), str(caught.value))
     assert check_place(caught.value, file)
@@ -213,5 +213,5 @@ def test_every_mistake_is_named(
 def test_a_log_made_from_python_holds_no_configuration(tmp_path: Path) -> None:
     rollout = load_experiment(MOVING, "simulation.duration=0.01").run()
     del rollout.meta["config"]
-    with pytest.raises(exceptions.ConfigError, match="made from Python"):
+    with pytest.raises(errors.ConfigError, match="made from Python"):
         load_experiment(rollout.save(tmp_path / "run.npz"))

@@ -10,7 +10,7 @@ from robot_texts import ARM, INERTIA
 
 from hsp_control import Rollout, load_experiment
 from hsp_control.cli import main
-from hsp_control.common.exceptions import ConfigError, ConfigurationError, ModelError
+from hsp_control.common.errors import ConfigError, ConfigurationError, ModelError
 from hsp_control.robot import RobotDescription
 
 IIWA: dict[str, Any] = {

@@ -8,7 +8,7 @@ import pytest
 
 import hsp_control as hsp
 from hsp_control.cli.main import main
-from hsp_control.common.exceptions import ConfigError
+from hsp_control.common.errors import ConfigError
 from hsp_control.config import import_file
 from hsp_control.declaration import imported
 

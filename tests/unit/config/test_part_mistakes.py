@@ -13,8 +13,8 @@ from scenario_document import check_place, line_of
 from wording import wording
 
 from hsp_control import load_experiment
-from hsp_control.common import exceptions
-from hsp_control.common.exceptions import ConfigError, HspControlError
+from hsp_control.common import errors
+from hsp_control.common.errors import ConfigError, HspControlError
 from hsp_control.common.resources import bundled_configs
 from hsp_control.config.document import Document
 from hsp_control.config.loaded_scenario import validate
@@ -138,9 +138,9 @@ def test_every_mistake_is_named(
 ) -> None:
     file = tmp_path / "mine.yaml"
     file.write_text(yaml.safe_dump({**BASE, **sections}, sort_keys=False))
-    with pytest.raises(getattr(exceptions, error)) as caught:
+    with pytest.raises(getattr(errors, error)) as caught:
         load_experiment(file)
-    assert type(caught.value) is getattr(exceptions, error)
+    assert type(caught.value) is getattr(errors, error)
     check_place(caught.value, file)
     _, _, text = str(caught.value).removeprefix(f"{file}:").partition(": ")
     assert re.search(wording(message), text)

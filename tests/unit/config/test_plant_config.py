@@ -11,7 +11,7 @@ from places import ROOT
 from wording import wording
 
 from hsp_control import load_experiment
-from hsp_control.common.exceptions import HspControlError
+from hsp_control.common.errors import HspControlError
 from hsp_control.simulation.plants import (
     ImperfectPlant,
 )

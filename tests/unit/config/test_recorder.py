@@ -10,7 +10,7 @@ from odd_errors import NamelessError
 from robot_cases import load
 
 import hsp_control as hsp
-from hsp_control.common.exceptions import ConfigError, LogError
+from hsp_control.common.errors import ConfigError, LogError
 
 PERIOD = 1e-3
 

@@ -26,7 +26,7 @@ from hsp_control import (
     Sphere,
     load_experiment,
 )
-from hsp_control.common.exceptions import ConfigError, HspControlError, SceneError
+from hsp_control.common.errors import ConfigError, HspControlError, SceneError
 from hsp_control.common.resources import bundled_configs
 from hsp_control.config.document import Document
 from hsp_control.config.loaded_scenario import validate

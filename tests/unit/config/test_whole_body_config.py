@@ -11,7 +11,7 @@ from scenario_document import check_place
 from wording import wording
 
 from hsp_control import load_experiment
-from hsp_control.common import exceptions
+from hsp_control.common import errors
 
 pytest.importorskip("example_robot_data")
 
@@ -108,7 +108,7 @@ def changed(base: dict[str, Any], path: str, value: Any) -> dict[str, Any]:
 def check(data: dict[str, Any], error: str, message: str, file: Path) -> None:
     """The message names the file, the line, and the wrong value."""
     file.write_text(yaml.safe_dump(data, sort_keys=False))
-    with pytest.raises(getattr(exceptions, error)) as caught:
+    with pytest.raises(getattr(errors, error)) as caught:
         load_experiment(file)
     assert re.search(wording(f"... {message}"), str(caught.value))
     path = message.partition(": ")[0]

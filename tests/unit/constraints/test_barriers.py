@@ -11,7 +11,7 @@ from loaded_robots import panda
 from runs import held
 
 import hsp_control as hsp
-from hsp_control.common.exceptions import FrameNotFoundError, LimitError
+from hsp_control.common.errors import FrameNotFoundError, LimitError
 from hsp_control.declaration.quantities import Positive
 from hsp_control.geometry.scene import Scene, Start
 

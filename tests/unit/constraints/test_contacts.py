@@ -20,7 +20,7 @@ from runs import check_errors, check_null_space, continuous, held
 
 import hsp_control as hsp
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import ContactError, FrameNotFoundError
+from hsp_control.common.errors import ContactError, FrameNotFoundError
 from hsp_control.constraints.contacts.contact import UnactuatedRows
 from hsp_control.control.actuation import Status
 from hsp_control.control.actuation.support import Support

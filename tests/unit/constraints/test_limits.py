@@ -15,7 +15,7 @@ from states import at_home
 
 from hsp_control import Hold, Limits, Obstacle, Robot, Sphere
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import (
+from hsp_control.common.errors import (
     FieldError,
     HspControlError,
     JointNotFoundError,

@@ -7,7 +7,7 @@ import pytest
 
 import hsp_control as hsp
 from hsp_control.cli import main
-from hsp_control.common.exceptions import HspControlError, LimitError
+from hsp_control.common.errors import HspControlError, LimitError
 from hsp_control.control.clock_check import ClockWarning
 from hsp_control.control.first_state import StartWarning
 from hsp_control.simulation.simulate import RunWarning

@@ -19,7 +19,7 @@ from wording import wording
 import hsp_control as hsp
 from hsp_control import engine
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import ContactError, ControllerError
+from hsp_control.common.errors import ContactError, ControllerError
 from hsp_control.constraints.contacts import (
     CommandedForce,
     Contact,

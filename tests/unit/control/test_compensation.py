@@ -17,7 +17,7 @@ from task_cases import placed
 
 import hsp_control as hsp
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import SimulationError
+from hsp_control.common.errors import SimulationError
 from hsp_control.control.compensation import (
     CompensatedController,
     Compensation,

@@ -14,7 +14,7 @@ from wording import wording
 
 from hsp_control import Robot
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import CompensationError, ImmutableError
+from hsp_control.common.errors import CompensationError, ImmutableError
 from hsp_control.control.compensation import (
     CompensatedController,
     Compensation,

@@ -18,7 +18,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 import hsp_control as hsp
 from hsp_control import Controller, FramePosition, Limits, TargetPosture
-from hsp_control.common.exceptions import ControllerError
+from hsp_control.common.errors import ControllerError
 from hsp_control.control.actuation import Status
 
 # --- the output ----------------------------------------------------------------------

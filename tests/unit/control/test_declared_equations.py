@@ -11,7 +11,7 @@ from task_cases import GAINS, TIME, Case, Tumble, every_task, place, wobble
 
 import hsp_control as hsp
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import RateError
+from hsp_control.common.errors import RateError
 from hsp_control.control.declared_rates import check_task, check_trajectories
 from hsp_control.geometry.scene import Start
 from hsp_control.law import TaskSample

@@ -10,7 +10,7 @@ import pytest
 
 import hsp_control as hsp
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import RateError
+from hsp_control.common.errors import RateError
 from hsp_control.declaration import imported
 from hsp_control.declaration.language import in_yaml
 from hsp_control.engine.plans import PartCall

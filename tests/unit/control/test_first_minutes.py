@@ -21,7 +21,7 @@ from wording import wording
 
 import hsp_control as hsp
 from hsp_control.cli.main import main
-from hsp_control.common.exceptions import ConfigurationError, ControllerError
+from hsp_control.common.errors import ConfigurationError, ControllerError
 from hsp_control.control.first_state import JUMP, StartWarning, warn_of_jump
 from hsp_control.control.first_state import REST as REST_SPEED
 

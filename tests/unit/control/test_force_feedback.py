@@ -9,7 +9,7 @@ from runs import held
 from wording import wording
 
 from hsp_control import Controller, FrameOrientation, Gains, Limits
-from hsp_control.common.exceptions import CompensationError
+from hsp_control.common.errors import CompensationError
 from hsp_control.constraints.contacts import CommandedForce, PointContact
 from hsp_control.control.compensation import (
     CompensatedController,

@@ -7,7 +7,7 @@ import pytest
 
 import hsp_control as hsp
 from hsp_control.cli import main
-from hsp_control.common.exceptions import ConfigError
+from hsp_control.common.errors import ConfigError
 from hsp_control.null_space.metrics import IdentityMetric, MassMatrixMetric, Metric
 from hsp_control.simulation.plants.model_changes import Inertias, changed
 

@@ -18,7 +18,7 @@ from wording import wording
 import hsp_control as hsp
 from hsp_control import Controller, FramePosition, Robot, TargetPosture
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import GainError
+from hsp_control.common.errors import GainError
 from hsp_control.control.fitting import checked_gain
 
 COUNT = 2500 if THOROUGH else 500

@@ -10,7 +10,7 @@ import pytest
 
 import hsp_control as hsp
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import NonFiniteError
+from hsp_control.common.errors import NonFiniteError
 
 H = 2.0**-9
 """Period [s] for which t - t0 has the same bits at all of these clocks."""

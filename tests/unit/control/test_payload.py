@@ -14,7 +14,7 @@ from places import further
 import hsp_control as hsp
 from hsp_control.cli.live_experiment import simulated_robot
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import ControllerError, HspControlError
+from hsp_control.common.errors import ControllerError, HspControlError
 from hsp_control.control.compensation import (
     CompensatedController,
     Compensation,

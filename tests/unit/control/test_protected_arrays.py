@@ -16,7 +16,7 @@ import pytest
 
 import hsp_control as hsp
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import (
+from hsp_control.common.errors import (
     ControllerError,
     ImmutableError,
     ModelError,

@@ -26,7 +26,7 @@ from hsp_control import (
     simulate,
 )
 from hsp_control.cli.main import main
-from hsp_control.common.exceptions import UnstableRateError
+from hsp_control.common.errors import UnstableRateError
 from hsp_control.control.compensation import (
     Compensation,
     IntegralAction,

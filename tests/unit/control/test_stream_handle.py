@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import hsp_control as hsp
-from hsp_control.common.exceptions import StreamError
+from hsp_control.common.errors import StreamError
 from hsp_control.control.stream_handle import StreamHandle
 
 ROBOT = hsp.Robot.load("panda")

@@ -7,7 +7,7 @@ import pytest
 
 import hsp_control as hsp
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import ControllerError
+from hsp_control.common.errors import ControllerError
 from hsp_control.control.compensation import (
     CompensatedController,
     Compensation,

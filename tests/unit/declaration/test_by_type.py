@@ -9,7 +9,7 @@ import jsonschema
 import pytest
 from pydantic import TypeAdapter
 
-from hsp_control.common.exceptions import ConfigError, ImmutableError, SimulationError
+from hsp_control.common.errors import ConfigError, ImmutableError, SimulationError
 from hsp_control.declaration import Part
 from hsp_control.declaration.by_type import ByType
 from hsp_control.declaration.quantities import (

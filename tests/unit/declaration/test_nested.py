@@ -2,7 +2,7 @@
 
 import pytest
 
-from hsp_control.common.exceptions import TrajectoryError
+from hsp_control.common.errors import TrajectoryError
 from hsp_control.declaration.nested import parts_within, with_parts_replaced
 from hsp_control.tasks import FramePose, FramePosition
 from hsp_control.trajectories import Circle, ComposedPose, Hold, HoldOrientation, Line

@@ -18,7 +18,7 @@ from pydantic import TypeAdapter, ValidationError
 from values import assert_is_a_value
 from wording import wording
 
-from hsp_control.common.exceptions import ConfigError, HspControlError
+from hsp_control.common.errors import ConfigError, HspControlError
 from hsp_control.declaration import AnyOf, Part, families
 from hsp_control.declaration.quantities import (
     Count,

@@ -8,7 +8,7 @@ from pydantic import TypeAdapter, ValidationError
 from wording import wording
 
 import hsp_control as hsp
-from hsp_control.common.exceptions import HspControlError
+from hsp_control.common.errors import HspControlError
 from hsp_control.declaration import quantities
 from hsp_control.declaration.quantities import LARGEST
 

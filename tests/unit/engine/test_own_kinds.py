@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from hsp_control import engine
-from hsp_control.common.exceptions import EngineError
+from hsp_control.common.errors import EngineError
 from hsp_control.engine import own_kinds
 from hsp_control.engine.inspection import listing
 

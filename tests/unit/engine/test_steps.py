@@ -26,7 +26,7 @@ from hsp_control import (
     Robot,
     RobotState,
 )
-from hsp_control.common.exceptions import ControllerError
+from hsp_control.common.errors import ControllerError
 from hsp_control.control.actuation import Status
 from hsp_control.engine import Call
 from hsp_control.engine.inspection import calls, first_nan, listing

@@ -8,7 +8,7 @@ import pytest
 from frozen_runs import commanded, random_states, replayed
 
 import hsp_control as hsp
-from hsp_control.common.exceptions import CompensationError, FreezeError
+from hsp_control.common.errors import CompensationError, FreezeError
 
 SEED = 61
 PARTS = hsp.compensation

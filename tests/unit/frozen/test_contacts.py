@@ -20,7 +20,7 @@ from frozen_library import (
 from frozen_runs import computed, random_states, replayed
 
 import hsp_control as hsp
-from hsp_control.common.exceptions import FreezeError
+from hsp_control.common.errors import FreezeError
 from hsp_control.constraints.contacts import CommandedForce
 from hsp_control.live import LiveSettings, SafeStop, StopSettings
 from hsp_control.live.safe_stop import StandingFeet

@@ -15,7 +15,7 @@ from frozen_runs import (
 from places import THOROUGH
 
 import hsp_control as hsp
-from hsp_control.common.exceptions import EngineError, FreezeError
+from hsp_control.common.errors import EngineError, FreezeError
 from hsp_control.common.resources import bundled_configs
 from hsp_control.engine import own_kinds
 from hsp_control.engine.plans import PartCall

@@ -16,7 +16,7 @@ from frozen_library import (
 )
 
 import hsp_control as hsp
-from hsp_control.common.exceptions import FreezeError
+from hsp_control.common.errors import FreezeError
 
 H = 0.001
 

@@ -11,7 +11,7 @@ from frozen_library import OK, TOO_MANY, WRONG_NAME, WRONG_VALUE, Opened
 from pydantic import InstanceOf
 
 import hsp_control as hsp
-from hsp_control.common.exceptions import FreezeError
+from hsp_control.common.errors import FreezeError
 from hsp_control.control.change import Change
 from hsp_control.control.evolution import ABSENT
 from hsp_control.control.planned import planned_task

@@ -18,7 +18,7 @@ from frozen_library import (
 from places import THOROUGH, covering
 
 import hsp_control as hsp
-from hsp_control.common.exceptions import FreezeError
+from hsp_control.common.errors import FreezeError
 from hsp_control.trajectories import Stream, StreamOrientation, StreamPose
 
 SEED = 61

@@ -15,7 +15,7 @@ from odd_robots import collision, odd_robot
 from places import THOROUGH
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import ModelError
+from hsp_control.common.errors import ModelError
 from hsp_control.geometry import link_shapes
 from hsp_control.geometry.enclosing import enclosing_capsule
 

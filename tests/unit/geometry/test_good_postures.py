@@ -6,7 +6,7 @@ import pytest
 from places import further
 
 from hsp_control import Robot
-from hsp_control.common.exceptions import ConfigurationError, FrameNotFoundError
+from hsp_control.common.errors import ConfigurationError, FrameNotFoundError
 from hsp_control.geometry import Obstacle, Sphere
 from hsp_control.geometry.good_postures import PostureSearch
 from hsp_control.null_space.fields import SelfClearance

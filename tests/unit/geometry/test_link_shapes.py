@@ -13,7 +13,7 @@ from loaded_robots import load
 from odd_robots import FACES, OCTAHEDRON, collision, odd_robot, write_stl
 
 from hsp_control import Obstacle
-from hsp_control.common.exceptions import ModelError, SceneError
+from hsp_control.common.errors import ModelError, SceneError
 from hsp_control.geometry import link_shapes
 from hsp_control.geometry.shapes import Box, Mesh, Sphere
 from hsp_control.null_space.fields import ObstacleClearance, SelfClearance

@@ -9,7 +9,7 @@ from mesh_texts import CORNERS, tetrahedron
 from odd_robots import collision, odd_robot
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import ModelError, SceneError
+from hsp_control.common.errors import ModelError, SceneError
 from hsp_control.geometry import link_shapes
 from hsp_control.geometry.shapes import Mesh
 from hsp_control.robot.description.mesh_units import mesh_units

@@ -11,7 +11,7 @@ from pydantic import TypeAdapter
 from values import assert_is_a_value
 
 from hsp_control import Obstacle
-from hsp_control.common.exceptions import HspControlError, SceneError
+from hsp_control.common.errors import HspControlError, SceneError
 from hsp_control.declaration import Part
 from hsp_control.declaration.families import value_fields
 from hsp_control.geometry.scene import Scene

@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 from hsp_control.cli import live
-from hsp_control.common.exceptions import HardwareError
+from hsp_control.common.errors import HardwareError
 from hsp_control.live import connect, hardware, publish
 
 

@@ -34,7 +34,7 @@ from places import THOROUGH, covering, further
 
 import hsp_control as hsp
 from hsp_control import Rollout
-from hsp_control.common.exceptions import HardwareError, HspControlError
+from hsp_control.common.errors import HardwareError, HspControlError
 from hsp_control.constraints.limits import own_limits
 from hsp_control.control.compensation import CompensatedController
 from hsp_control.live import (

@@ -23,7 +23,7 @@ from hsp_control import (
     simulate,
 )
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import HardwareError, LiveError
+from hsp_control.common.errors import HardwareError, LiveError
 from hsp_control.constraints.limits import PositionRange
 from hsp_control.control.changes import Changes
 from hsp_control.control.compensation import CompensatedController

@@ -14,7 +14,7 @@ from loaded_robots import panda
 from odd_errors import OddError
 from places import covering
 
-from hsp_control.common.exceptions import HardwareError, LiveError
+from hsp_control.common.errors import HardwareError, LiveError
 from hsp_control.live import (
     Faults,
     Hardware,

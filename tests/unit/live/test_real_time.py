@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 import hsp_control as hsp
-from hsp_control.common.exceptions import SimulationError
+from hsp_control.common.errors import SimulationError
 from hsp_control.live.real_time import no_garbage_collection, real_time_priority
 
 

@@ -14,7 +14,7 @@ from odd_robots import collision, odd_robot
 from wording import wording
 
 from hsp_control import NullSpaceField, Obstacle, Robot, load_experiment
-from hsp_control.common.exceptions import (
+from hsp_control.common.errors import (
     FieldError,
     HspControlError,
     ModelError,

@@ -18,7 +18,7 @@ from hsp_control import (
     TargetPosture,
 )
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import FieldError
+from hsp_control.common.errors import FieldError
 from hsp_control.law import IDENTITY, FieldSample, MetricSample
 from hsp_control.null_space.fields import (
     FieldSum,

@@ -21,7 +21,7 @@ from hsp_control import (
     TargetPosture,
 )
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import (
+from hsp_control.common.errors import (
     FieldError,
     FrameNotFoundError,
     JointNotFoundError,

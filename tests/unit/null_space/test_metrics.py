@@ -11,7 +11,7 @@ from law_cases import load
 from wording import wording
 
 from hsp_control import Cost, RobotState, TargetPosture
-from hsp_control.common.exceptions import MetricError
+from hsp_control.common.errors import MetricError
 from hsp_control.geometry import Scene
 from hsp_control.geometry.scene import Start
 from hsp_control.null_space.fields import FieldSample

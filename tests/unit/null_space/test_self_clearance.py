@@ -14,7 +14,7 @@ from states import moved
 
 from hsp_control import Robot
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import AccessError, ModelError
+from hsp_control.common.errors import AccessError, ModelError
 from hsp_control.geometry import Proximity, link_shapes, self_pairs
 from hsp_control.null_space.fields import SelfClearance
 from hsp_control.robot import RobotDescription

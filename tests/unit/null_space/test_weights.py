@@ -27,7 +27,7 @@ from hsp_control import (
     TargetPosture,
     simulate,
 )
-from hsp_control.common.exceptions import FieldError
+from hsp_control.common.errors import FieldError
 from hsp_control.geometry.shapes import Sphere
 from hsp_control.null_space.fields import (
     ConstantWeight,

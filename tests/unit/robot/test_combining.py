@@ -23,7 +23,7 @@ from hsp_control import (
     simulate,
 )
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import (
+from hsp_control.common.errors import (
     FrameNotFoundError,
     HspControlError,
     JointNotFoundError,

@@ -12,7 +12,7 @@ from refused_robots import REFUSED
 from robot_cases import BUNDLED, ROBOTS, load
 
 from hsp_control import Robot
-from hsp_control.common.exceptions import ConfigurationError, ShapeError
+from hsp_control.common.errors import ConfigurationError, ShapeError
 from hsp_control.robot.description.sources import RobotSource, example_robots
 
 

@@ -14,7 +14,7 @@ from robot_texts import ARM, assert_same_placements, link, placements
 
 from hsp_control import Robot
 from hsp_control.common import resources
-from hsp_control.common.exceptions import ModelError, RobotNotFoundError
+from hsp_control.common.errors import ModelError, RobotNotFoundError
 from hsp_control.common.resources import bundled_robots
 from hsp_control.robot import RobotDescription
 from hsp_control.robot.description.loading import load_model

@@ -12,7 +12,7 @@ from robot_texts import ARM, INERTIA, gripper, joint, link, robot_xml
 from wording import wording
 
 from hsp_control import HspControlError, Robot
-from hsp_control.common.exceptions import (
+from hsp_control.common.errors import (
     FrameNotFoundError,
     JointNotFoundError,
     ModelError,

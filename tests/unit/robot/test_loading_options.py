@@ -22,7 +22,7 @@ from wording import wording
 
 import hsp_control as hsp
 from hsp_control import Robot
-from hsp_control.common.exceptions import ModelError
+from hsp_control.common.errors import ModelError
 from hsp_control.geometry.links import link_shapes
 from hsp_control.robot import ToolFrame
 from hsp_control.robot.description.hand import find_hand

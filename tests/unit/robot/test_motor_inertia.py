@@ -9,7 +9,7 @@ import pytest
 from wording import wording
 
 import hsp_control as hsp
-from hsp_control.common.exceptions import (
+from hsp_control.common.errors import (
     JointNotFoundError,
     ModelError,
     SimulationError,

@@ -10,7 +10,7 @@ import pytest
 import hsp_control as hsp
 from hsp_control import Robot
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import ModelError
+from hsp_control.common.errors import ModelError
 
 ZERO = np.zeros(3)
 TILTED = np.array([0.6, 0.8, 0.0])

@@ -15,7 +15,7 @@ from robot_texts import INERTIA, joint, robot_xml
 
 import hsp_control as hsp
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import ModelError
+from hsp_control.common.errors import ModelError
 from hsp_control.companions.viewer.robot_drawing import read_visuals
 from hsp_control.companions.viewer.threejs import collada_object
 from hsp_control.geometry.links import link_shapes

@@ -16,7 +16,7 @@ from robot_cases import ROBOTS, assert_equal_terms, by_pickle, draw, everything,
 from wording import wording
 
 from hsp_control import Controller, Robot, RobotState, TargetPosture
-from hsp_control.common.exceptions import (
+from hsp_control.common.errors import (
     FrameNotFoundError,
     ImmutableError,
     JointNotFoundError,

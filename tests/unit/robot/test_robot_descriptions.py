@@ -7,7 +7,7 @@ import pytest
 from robot_texts import ARM
 
 from hsp_control import Robot
-from hsp_control.common.exceptions import AccessError, RobotNotFoundError
+from hsp_control.common.errors import AccessError, RobotNotFoundError
 from hsp_control.robot import PlacedRobot, RobotDescription
 from hsp_control.robot.description.access import only_within
 

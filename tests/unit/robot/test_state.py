@@ -13,7 +13,7 @@ from wording import wording
 
 from hsp_control import HspControlError, RobotState
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import ConfigurationError, NonFiniteError, ShapeError
+from hsp_control.common.errors import ConfigurationError, NonFiniteError, ShapeError
 from hsp_control.engine import PythonCall
 
 # --- one state, many moves -----------------------------------------------------------

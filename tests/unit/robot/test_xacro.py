@@ -9,7 +9,7 @@ import pytest
 from robot_texts import ARM
 
 from hsp_control import Robot
-from hsp_control.common.exceptions import AccessError, ModelError
+from hsp_control.common.errors import AccessError, ModelError
 from hsp_control.robot import RobotDescription
 from hsp_control.robot.description.access import only_within
 from hsp_control.robot.description.sources import find_robot

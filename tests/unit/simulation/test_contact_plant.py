@@ -11,7 +11,7 @@ from wording import wording
 
 from hsp_control import Robot
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import (
+from hsp_control.common.errors import (
     FrameNotFoundError,
     ScheduleError,
     SimulationError,

@@ -8,7 +8,7 @@ import pytest
 
 import hsp_control as hsp
 from hsp_control.cli.main import main
-from hsp_control.common.exceptions import HspControlError
+from hsp_control.common.errors import HspControlError
 from hsp_control.control.first_state import StartWarning
 from hsp_control.simulation.heavy_plant import SLOW, heavy_plant
 from hsp_control.simulation.plants import Inertias, Payload, RigidBody

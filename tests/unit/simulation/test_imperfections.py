@@ -14,7 +14,7 @@ from wording import wording
 
 from hsp_control import Controller, FramePosition, Gains, Robot, Rollout, simulate
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import SimulationError
+from hsp_control.common.errors import SimulationError
 from hsp_control.robot.description.sources import find_robot
 from hsp_control.robot.friction import Friction, JointFriction
 from hsp_control.robot.integrators import Dop853, Rk4

@@ -13,7 +13,7 @@ from closed_loops import EXACT, ROBOTS, distance, load, order, start
 import hsp_control as hsp
 from hsp_control import Robot
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import LogError, SimulationError
+from hsp_control.common.errors import LogError, SimulationError
 from hsp_control.engine.plans import planned
 from hsp_control.robot import integrators
 from hsp_control.robot.integrators import Dop853, Rk4, SemiImplicitEuler

@@ -18,7 +18,7 @@ from live_rigs import PERIOD, Rig, law, start, watched
 
 from hsp_control import Rollout, load_experiment, simulate
 from hsp_control.cli import main
-from hsp_control.common.exceptions import LogError
+from hsp_control.common.errors import LogError
 from hsp_control.live import (
     LiveSettings,
     LoopReport,

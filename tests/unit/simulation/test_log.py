@@ -22,7 +22,7 @@ from hsp_control import (
 )
 from hsp_control.cli import main
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import LogError, ShapeError
+from hsp_control.common.errors import LogError, ShapeError
 from hsp_control.constraints.limits.limits import own_limits
 from hsp_control.null_space.metrics import MassMatrixMetric
 from hsp_control.robot.integrators import Rk4

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from hsp_control import load_experiment
-from hsp_control.common.exceptions import FallError, SimulationError
+from hsp_control.common.errors import FallError, SimulationError
 from hsp_control.control.compensation import CompensatedController
 from hsp_control.control.measurement import Measurement
-from hsp_control.control.motion_plan import MotionPlan, PlanParts, RunningPlan
+from hsp_control.control.plans import MotionPlan, PlanParts, RunningPlan
 from hsp_control.robot.integrators import Rk4
 from hsp_control.simulation import simulate
 from hsp_control.simulation.control_chain import ControlChain

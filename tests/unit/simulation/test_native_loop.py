@@ -18,7 +18,7 @@ from hsp_control import (
     load_experiment,
     simulate,
 )
-from hsp_control.common.exceptions import SimulationError
+from hsp_control.common.errors import SimulationError
 from hsp_control.config import Experiment
 from hsp_control.constraints.limits import RobotLimits
 from hsp_control.control.actuation.limit_checks import LimitsOutcome

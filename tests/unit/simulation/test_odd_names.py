@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import hsp_control as hsp
-from hsp_control.common.exceptions import HspControlError
+from hsp_control.common.errors import HspControlError
 from hsp_control.simulation.journal import JournalReader, JournalWriter
 
 NAMES = {"long": "x" * 300, "huge": "x" * 1_000_000, "nul": "a\0b"}

@@ -10,7 +10,7 @@ from wording import wording
 
 from hsp_control import Controller, RobotState, Rollout, simulate
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import (
+from hsp_control.common.errors import (
     ConfigurationError,
     NonFiniteError,
     ShapeError,

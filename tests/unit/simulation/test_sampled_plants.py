@@ -9,7 +9,7 @@ from compensators import ALONE
 
 from hsp_control import Robot, RobotState, Rollout, simulate
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import SimulationError
+from hsp_control.common.errors import SimulationError
 from hsp_control.control.measurement import LogChannel
 from hsp_control.robot.integrators import Rk4
 from hsp_control.simulation.plants import IntegratedPlant, Plant, RigidBodyPlant

@@ -12,7 +12,7 @@ from task_cases import SECOND, TIME, Motion, placed, wobble
 import hsp_control as hsp
 from hsp_control import RobotState
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import HspControlError, TaskError
+from hsp_control.common.errors import HspControlError, TaskError
 from hsp_control.tasks import FunctionTask
 
 

@@ -14,7 +14,7 @@ from wording import wording
 import hsp_control as hsp
 from hsp_control import Controller, Gains, JointPosture, Robot
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import GainError
+from hsp_control.common.errors import GainError
 
 
 @pytest.mark.slow

@@ -31,7 +31,7 @@ from wording import wording
 import hsp_control as hsp
 from hsp_control import Controller, FramePosition, Gains, JointPosture
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import (
+from hsp_control.common.errors import (
     CompensationError,
     ControllerError,
     GainError,

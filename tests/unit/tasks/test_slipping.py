@@ -11,7 +11,7 @@ from task_cases import placed
 
 import hsp_control as hsp
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import GainError
+from hsp_control.common.errors import GainError
 from hsp_control.tasks.feedback import ErrorPart
 from hsp_control.tasks.impedance import parts_of
 from hsp_control.tasks.slipping import slipped, spring_force

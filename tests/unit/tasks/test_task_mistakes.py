@@ -19,7 +19,7 @@ from hsp_control import (
     JointPosture,
     Pointing,
 )
-from hsp_control.common.exceptions import (
+from hsp_control.common.errors import (
     ConfigurationError,
     FrameNotFoundError,
     GainError,

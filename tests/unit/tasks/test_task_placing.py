@@ -27,7 +27,7 @@ from hsp_control import (
     RobotState,
     Task,
 )
-from hsp_control.common.exceptions import (
+from hsp_control.common.errors import (
     FrameNotFoundError,
     GainError,
     JointNotFoundError,

@@ -19,7 +19,7 @@ from wording import wording
 
 import hsp_control as hsp
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import TrajectoryError
+from hsp_control.common.errors import TrajectoryError
 from hsp_control.engine.plans import planned
 from hsp_control.engine.rotations import log3
 from hsp_control.trajectories import (

@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from places import THOROUGH
 
-from hsp_control.common.exceptions import StreamError, TrajectoryError
+from hsp_control.common.errors import StreamError, TrajectoryError
 from hsp_control.trajectories import (
     Stream,
     StreamOrientation,

@@ -30,7 +30,7 @@ from wording import wording
 
 import hsp_control.trajectories as family
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import ImmutableError, ShapeError, TrajectoryError
+from hsp_control.common.errors import ImmutableError, ShapeError, TrajectoryError
 from hsp_control.declaration.quantities import Number
 from hsp_control.engine.rotations import log3
 from hsp_control.trajectories import (

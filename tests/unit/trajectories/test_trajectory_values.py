@@ -26,7 +26,7 @@ from trajectory_cases import (
 from values import assert_is_a_value
 
 import hsp_control.trajectories as family
-from hsp_control.common.exceptions import TrajectoryError
+from hsp_control.common.errors import TrajectoryError
 from hsp_control.engine.plans import planned
 from hsp_control.trajectories import (
     Along,

@@ -20,7 +20,7 @@ from played import wait_until
 
 import hsp_control as hsp
 from hsp_control.cli.robot_process import RobotProcess
-from hsp_control.common.exceptions import HardwareError
+from hsp_control.common.errors import HardwareError
 from hsp_control.companions.cameras import show
 from hsp_control.live import run_loop
 
@@ -133,7 +133,7 @@ import os, signal, sys
 import multiprocessing
 import hsp_control as hsp
 from hsp_control.companions.cameras import pictures
-from hsp_control.common.exceptions import HardwareError
+from hsp_control.common.errors import HardwareError
 
 if __name__ == "__main__":
     plant = hsp.load_experiment(sys.argv[1]).plant

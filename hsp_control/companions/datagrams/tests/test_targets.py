@@ -17,7 +17,7 @@ from wording import wording
 import hsp_control as hsp
 from hsp_control import Stream
 from hsp_control.cli.live_experiment import of_a_robot
-from hsp_control.common.exceptions import StreamError
+from hsp_control.common.errors import StreamError
 from hsp_control.companions.datagrams.targets import opened
 from hsp_control.config.document import read_document
 from hsp_control.trajectories.streams.followed import FollowedPoint, FollowedPose

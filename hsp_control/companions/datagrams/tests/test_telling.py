@@ -18,7 +18,7 @@ from loaded_robots import panda
 from ports import free_port
 
 import hsp_control as hsp
-from hsp_control.common.exceptions import HardwareError
+from hsp_control.common.errors import HardwareError
 from hsp_control.companions.datagrams import publish
 from hsp_control.control.compensation import (
     CompensatedController,

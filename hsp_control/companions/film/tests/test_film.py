@@ -10,7 +10,7 @@ from wording import wording
 
 from hsp_control import Rollout, load_experiment
 from hsp_control.cli import main
-from hsp_control.common.exceptions import ExportError
+from hsp_control.common.errors import ExportError
 from hsp_control.companions.film import FilmStyle, encoding, export_film
 from hsp_control.companions.film.screenshots import frame_times
 

@@ -14,7 +14,7 @@ import pytest
 
 from hsp_control import Robot
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import HardwareError
+from hsp_control.common.errors import HardwareError
 from hsp_control.common.silence import Silence
 from hsp_control.companions.franka import (
     FrankaHardware,

@@ -10,7 +10,7 @@ import pytest
 
 from hsp_control import Robot
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import HardwareError, ModelError
+from hsp_control.common.errors import HardwareError, ModelError
 from hsp_control.companions.franka.model_check import difference, postures
 from hsp_control.companions.franka.robot_model import calibrated, own_model
 

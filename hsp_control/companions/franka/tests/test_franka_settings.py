@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from hsp_control.cli import main
-from hsp_control.common.exceptions import LiveError
+from hsp_control.common.errors import LiveError
 from hsp_control.companions.franka import FrankaSettings, Load
 from hsp_control.companions.franka.reflexes import MODES, REFLEXES, explained
 

@@ -8,7 +8,7 @@ from franka_boxes import home, panda, plant
 
 from hsp_control import Rollout, load_experiment
 from hsp_control.cli.main import main
-from hsp_control.common.exceptions import LogError
+from hsp_control.common.errors import LogError
 from hsp_control.companions.franka.layouts import (
     COMMAND,
     ControllerMode,

@@ -27,7 +27,7 @@ from places import ROOT
 from hsp_control import Robot, Rollout, load_experiment
 from hsp_control.cli import main
 from hsp_control.cli.options import command_line
-from hsp_control.common.exceptions import HardwareError
+from hsp_control.common.errors import HardwareError
 from hsp_control.companions.franka import (
     FrankaHardware,
     FrankaSettings,

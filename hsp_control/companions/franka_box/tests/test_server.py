@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from franka_boxes import Rig, home, panda, plant, served
 
-from hsp_control.common.exceptions import HardwareError, LiveError
+from hsp_control.common.errors import HardwareError, LiveError
 from hsp_control.companions.franka.layouts import (
     COMMAND,
     HEADER,

@@ -11,7 +11,7 @@ from wording import wording
 
 from hsp_control import Robot, load_experiment
 from hsp_control.cli.main import main
-from hsp_control.common.exceptions import (
+from hsp_control.common.errors import (
     AccessError,
     FrameNotFoundError,
     HspControlError,

@@ -11,7 +11,7 @@ from mjcf_texts import ARM, CELL, trees
 from wording import wording
 
 from hsp_control import Robot
-from hsp_control.common.exceptions import (
+from hsp_control.common.errors import (
     FrameNotFoundError,
     HspControlError,
     JointNotFoundError,

@@ -15,7 +15,7 @@ from wording import wording
 import hsp_control as hsp
 from hsp_control import Robot
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import (
+from hsp_control.common.errors import (
     FrameNotFoundError,
     ModelError,
     SimulationError,

@@ -8,7 +8,7 @@ import pytest
 from mjcf_texts import ARM, CELL
 
 from hsp_control import Controller, FramePosition, Gains, Robot, simulate
-from hsp_control.common.exceptions import (
+from hsp_control.common.errors import (
     FrameNotFoundError,
     JointNotFoundError,
     SimulationError,

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from loaded_robots import panda
 
-from hsp_control.common.exceptions import SimulationError
+from hsp_control.common.errors import SimulationError
 from hsp_control.companions.mujoco import ContactShape, Solid
 from hsp_control.companions.mujoco.plant import Mujoco, MujocoPlant
 from hsp_control.geometry.shapes import Box, HalfSpace, Sphere

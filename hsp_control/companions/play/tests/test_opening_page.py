@@ -11,7 +11,7 @@ import pytest
 
 import hsp_control as hsp
 from hsp_control.cli import main
-from hsp_control.common.exceptions import ViewerError
+from hsp_control.common.errors import ViewerError
 from hsp_control.companions.play import steering
 from hsp_control.companions.play.live_loop import channel_pair
 from hsp_control.companions.play.playable import playable

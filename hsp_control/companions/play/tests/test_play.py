@@ -13,7 +13,7 @@ from wording import wording
 
 import hsp_control as hsp
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import ConfigError
+from hsp_control.common.errors import ConfigError
 from hsp_control.companions.play import Session, play
 from hsp_control.companions.play.knobs import _scaled, knobs_of
 from hsp_control.companions.play.other_law import PLAIN, OtherLaw

@@ -9,7 +9,7 @@ from drawn_logs import changed, drawn, legend_texts, planar, spatial
 import hsp_control.companions.plots as plots
 from hsp_control import Rollout
 from hsp_control.cli import main
-from hsp_control.common.exceptions import PlotError
+from hsp_control.common.errors import PlotError
 from hsp_control.companions.plots import palette
 
 

@@ -13,7 +13,7 @@ from places import further
 import hsp_control.companions.plots as plots
 from hsp_control import Rollout
 from hsp_control.cli import main
-from hsp_control.common.exceptions import PlotError
+from hsp_control.common.errors import PlotError
 
 # --- short logs ----------------------------------------------------------------------
 

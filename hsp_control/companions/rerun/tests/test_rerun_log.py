@@ -15,7 +15,7 @@ import hsp_control as hsp
 from hsp_control import Robot
 from hsp_control.cli import main
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import ExportError
+from hsp_control.common.errors import ExportError
 from hsp_control.companions.rerun.log import (
     _archetypes,
     _log_paths,

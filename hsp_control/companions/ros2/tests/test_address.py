@@ -2,7 +2,7 @@
 
 import pytest
 
-from hsp_control.common.exceptions import HardwareError
+from hsp_control.common.errors import HardwareError
 from hsp_control.companions.ros2.address import parse
 
 

@@ -8,7 +8,7 @@ from cyclonedds._clayer import ddspy_write
 from ros2_rigs import DOMAIN, fresh, joint_state
 from rosbags.typesys import Stores, get_typestore
 
-from hsp_control.common.exceptions import HardwareError
+from hsp_control.common.errors import HardwareError
 from hsp_control.companions.ros2.messages import (
     TYPE_HASHES,
     Float64MultiArray,

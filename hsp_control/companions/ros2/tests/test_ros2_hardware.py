@@ -11,7 +11,7 @@ from loaded_robots import panda
 from robot_cases import load
 from ros2_rigs import DOMAIN, MILLISECOND, Broadcaster, fresh, joint_state
 
-from hsp_control.common.exceptions import HardwareError
+from hsp_control.common.errors import HardwareError
 from hsp_control.companions.ros2 import connect
 from hsp_control.companions.ros2 import hardware as ros2_hardware
 from hsp_control.companions.ros2.hardware import Ros2Hardware

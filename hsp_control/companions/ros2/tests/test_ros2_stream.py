@@ -11,7 +11,7 @@ from ros2_rigs import DOMAIN, fresh
 from wording import wording
 
 from hsp_control import Stream, StreamPose
-from hsp_control.common.exceptions import StreamError
+from hsp_control.common.errors import StreamError
 from hsp_control.companions.ros2.messages import (
     Header,
     Point,

@@ -7,7 +7,7 @@ from loaded_robots import panda
 from ros2_rigs import DOMAIN, fresh
 
 from hsp_control import Controller, FramePose, FramePosition, Gains, Stream, StreamPose
-from hsp_control.common.exceptions import HardwareError
+from hsp_control.common.errors import HardwareError
 from hsp_control.companions.ros2 import publish
 from hsp_control.companions.ros2.messages import JointState, PoseStamped
 from hsp_control.companions.ros2.node import Node, Subscription

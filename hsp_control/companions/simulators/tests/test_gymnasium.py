@@ -14,7 +14,7 @@ import yaml
 from arm_environment import STRONGEST, ArmEnv
 from gymnasium.utils.env_checker import check_env
 
-from hsp_control.common.exceptions import (
+from hsp_control.common.errors import (
     ControllerError,
     FrameNotFoundError,
     NonFiniteError,

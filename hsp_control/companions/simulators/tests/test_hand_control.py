@@ -9,7 +9,7 @@ import pinocchio as pin
 import pytest
 
 import hsp_control as hsp
-from hsp_control.common.exceptions import (
+from hsp_control.common.errors import (
     ConfigError,
     FieldError,
     FrameNotFoundError,

@@ -16,7 +16,7 @@ import pytest
 
 robosuite = pytest.importorskip("robosuite")
 
-from hsp_control.common.exceptions import (  # noqa: E402
+from hsp_control.common.errors import (  # noqa: E402
     ConfigError,
     ControllerError,
     GainError,

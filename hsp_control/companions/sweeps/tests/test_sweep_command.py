@@ -8,7 +8,7 @@ from sweep_runs import MOVING, OVER, QUICK
 
 import hsp_control as hsp
 from hsp_control.cli import main
-from hsp_control.common.exceptions import SweepError
+from hsp_control.common.errors import SweepError
 
 
 @pytest.mark.parametrize(("arguments", "message"), [

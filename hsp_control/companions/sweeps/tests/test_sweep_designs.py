@@ -11,7 +11,7 @@ from places import further
 from scipy import stats
 from scipy.special import ndtr, ndtri
 
-from hsp_control.common.exceptions import PlotError, SweepError
+from hsp_control.common.errors import PlotError, SweepError
 from hsp_control.companions import sweeps
 from hsp_control.companions.sweeps import Sweep, row_files
 from hsp_control.companions.sweeps.design import chosen_design, points

@@ -22,7 +22,7 @@ from places import further
 from sweep_runs import MOVING, OVER, QUICK, SCHEDULER, WORKER, open_port
 
 import hsp_control as hsp
-from hsp_control.common.exceptions import ConfigError, HspControlError, SweepError
+from hsp_control.common.errors import ConfigError, HspControlError, SweepError
 from hsp_control.companions.sweeps import Sweep, cluster, sweep_runs
 from hsp_control.companions.sweeps.one_run import Row, computed
 from hsp_control.companions.sweeps.row_files import RowFiles, read_rows

@@ -20,7 +20,7 @@ from scipy.spatial import cKDTree
 
 from hsp_control import Robot, Rollout, load_experiment
 from hsp_control.cli import main
-from hsp_control.common.exceptions import ExportError, ViewerError
+from hsp_control.common.errors import ExportError, ViewerError
 from hsp_control.companions.viewer import ComparedRun, export_html, robot_of
 from hsp_control.companions.viewer.export_page import write_page
 from hsp_control.companions.viewer.packing import (

@@ -9,7 +9,7 @@ from places import further
 import hsp_control.companions.plots as plots
 from hsp_control import Rollout, load_experiment
 from hsp_control.cli import main
-from hsp_control.common.exceptions import ExportError
+from hsp_control.common.errors import ExportError
 from hsp_control.companions.plots.analysis import expected_floor
 from hsp_control.companions.plots.log_series import held_period
 from hsp_control.companions.viewer import ComparedRun, export_html

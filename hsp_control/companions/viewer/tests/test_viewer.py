@@ -10,7 +10,7 @@ import pytest
 from clips import Clip, Recorder, reported
 
 from hsp_control import Obstacle, Robot, Rollout, load_experiment
-from hsp_control.common.exceptions import ViewerError
+from hsp_control.common.errors import ViewerError
 from hsp_control.companions.viewer import Viewer, robot_of, view_logs
 from hsp_control.companions.viewer.commands import CAMERA, CAPTION, CLIP, unpack
 from hsp_control.companions.viewer.mesh_files import with_files

@@ -24,7 +24,7 @@ from tornado.httpclient import HTTPClientError, HTTPRequest
 from tornado.websocket import websocket_connect
 
 from hsp_control import Robot, Rollout
-from hsp_control.common.exceptions import ExportError, ViewerError
+from hsp_control.common.errors import ExportError, ViewerError
 from hsp_control.companions.viewer import SceneRecorder, Viewer, offline_page, transport
 from hsp_control.companions.viewer.commands import (
     CAMERA,

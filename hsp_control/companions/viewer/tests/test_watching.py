@@ -10,7 +10,7 @@ import pytest
 
 import hsp_control as hsp
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import FieldError, ViewerError
+from hsp_control.common.errors import FieldError, ViewerError
 from hsp_control.companions.viewer import watching
 from hsp_control.companions.viewer.commands import unpack
 from hsp_control.companions.viewer.live_picture import Picture

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from hsp_control import Rollout, load_experiment
-from hsp_control.common.exceptions import SimulationError
+from hsp_control.common.errors import SimulationError
 
 FEET = {
     "solo12": ("FL_FOOT FR_FOOT HL_FOOT HR_FOOT", 0.0165, "base_link"),

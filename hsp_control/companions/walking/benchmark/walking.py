@@ -18,7 +18,7 @@ import numpy as np
 from trotting import ramp
 
 from hsp_control import Rollout, load_experiment
-from hsp_control.common.exceptions import SimulationError
+from hsp_control.common.errors import SimulationError
 
 WALKS = {"talos": "walking/talos_walk", "g1": "walking/g1_walk"}
 PUSH = 200.0

@@ -19,7 +19,7 @@ from typing import Any
 from walking import summary
 
 from hsp_control import load_experiment
-from hsp_control.common.exceptions import HspControlError
+from hsp_control.common.errors import HspControlError
 
 SPEEDS = (0.3, 0.5, 0.7)
 STEPS = 6

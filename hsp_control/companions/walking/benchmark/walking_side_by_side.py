@@ -35,7 +35,7 @@ from walking import PUSH, WALKS
 
 from hsp_control import Experiment, RobotState, load_experiment
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import FallError
+from hsp_control.common.errors import FallError
 from hsp_control.control.measurement import Measurement
 from hsp_control.simulation.plants import SampledPlant
 

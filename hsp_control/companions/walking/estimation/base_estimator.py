@@ -6,7 +6,7 @@ from typing import ClassVar
 import numpy as np
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import EstimationError
+from hsp_control.common.errors import EstimationError
 from hsp_control.common.suggestions import did_you_mean, listing
 from hsp_control.companions.walking.estimation.invariant_filter import (
     ACCELEROMETER,

@@ -12,7 +12,7 @@ from typing import ClassVar
 import numpy as np
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import EstimationError
+from hsp_control.common.errors import EstimationError
 from hsp_control.constraints.contacts import Contact
 from hsp_control.control.interface import (
     Controller,

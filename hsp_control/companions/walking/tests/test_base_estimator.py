@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from hsp_control import Controller, load_experiment
-from hsp_control.common.exceptions import (
+from hsp_control.common.errors import (
     EstimationError,
     HspControlError,
     SimulationError,
@@ -14,7 +14,7 @@ from hsp_control.common.exceptions import (
 from hsp_control.companions.walking import BaseEstimator
 from hsp_control.companions.walking.estimation.invariant_filter import ROTATION
 from hsp_control.control.measurement import Inertial
-from hsp_control.control.motion_plan import MotionPlan, RunningPlan
+from hsp_control.control.plans import MotionPlan, RunningPlan
 from hsp_control.simulation import simulate
 from hsp_control.simulation.plants import Imu, RigidContact, RigidContacts
 

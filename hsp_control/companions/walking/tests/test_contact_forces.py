@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from hsp_control import Controller, JointPosture, load_experiment
-from hsp_control.common.exceptions import EstimationError
+from hsp_control.common.errors import EstimationError
 from hsp_control.companions.walking import ContactForces
 from hsp_control.constraints.contacts import PointContact
 from hsp_control.control.measurement import Measurement

@@ -8,7 +8,7 @@ import pinocchio as pin
 import pytest
 
 from hsp_control import FramePose
-from hsp_control.common.exceptions import TrajectoryError
+from hsp_control.common.errors import TrajectoryError
 from hsp_control.companions.walking.contact_switch import Switch
 from hsp_control.companions.walking.planned_references import Fed, FedOrientation
 from hsp_control.engine.plans import planned

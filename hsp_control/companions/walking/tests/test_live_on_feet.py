@@ -13,7 +13,7 @@ from places import THOROUGH, further
 import hsp_control as hsp
 from hsp_control.cli.live_experiment import check_live, simulated_robot
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import (
+from hsp_control.common.errors import (
     CompensationError,
     EstimationError,
     HardwareError,

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from hsp_control import load_experiment
-from hsp_control.common.exceptions import HspControlError, PlanError
+from hsp_control.common.errors import HspControlError, PlanError
 from hsp_control.companions.walking import Sensed, SensedContact
 from hsp_control.companions.walking.contact_switch import Switch
 from hsp_control.control.measurement import Measurement

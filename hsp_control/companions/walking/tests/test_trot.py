@@ -7,7 +7,7 @@ import pytest
 from wording import wording
 
 from hsp_control import Limits, Robot, load_experiment
-from hsp_control.common.exceptions import HspControlError, PlanError
+from hsp_control.common.errors import HspControlError, PlanError
 from hsp_control.companions.walking import Crawl, Trot
 from hsp_control.companions.walking.contact_switch import Switch
 from hsp_control.companions.walking.plan_composition import FRICTION

@@ -9,7 +9,7 @@ import pytest
 from wording import wording
 
 from hsp_control import Controller, FramePose, Gains, Robot, load_experiment
-from hsp_control.common.exceptions import FallError, HspControlError, PlanError
+from hsp_control.common.errors import FallError, HspControlError, PlanError
 from hsp_control.companions.walking import Walk
 from hsp_control.companions.walking.contact_switch import Switch
 from hsp_control.companions.walking.foot import Foot

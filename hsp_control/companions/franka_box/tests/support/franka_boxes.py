@@ -15,7 +15,7 @@ import numpy as np
 
 from hsp_control import Robot
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import HardwareError
+from hsp_control.common.errors import HardwareError
 from hsp_control.companions.franka.layouts import COMMAND, PERIOD
 from hsp_control.companions.franka_box import Arm, ControlBox, Server
 from hsp_control.robot.integrators import Rk4

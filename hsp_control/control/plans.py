@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 from hsp_control.common.entry_points import own_names
-from hsp_control.common.exceptions import PlanError
+from hsp_control.common.errors import PlanError
 from hsp_control.constraints.contacts import Contact
 from hsp_control.constraints.limits import Limits
 from hsp_control.control.controller import Controller

@@ -8,7 +8,7 @@ from pydantic import AfterValidator
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.entry_points import own_names
-from hsp_control.common.exceptions import EstimationError
+from hsp_control.common.errors import EstimationError
 from hsp_control.control.controller import Controller
 from hsp_control.control.measurement import Inertial, LogChannel, Measurement
 from hsp_control.declaration import Part, within

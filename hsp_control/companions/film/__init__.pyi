@@ -1,0 +1,2 @@
+from .film import FilmStyle as FilmStyle
+from .film import export_film as export_film

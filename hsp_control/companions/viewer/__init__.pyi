@@ -1,0 +1,11 @@
+from .comparison import ComparedRun as ComparedRun
+from .export_page import export_html as export_html
+from .live import LiveView as LiveView
+from .offline_page import InlineView as InlineView
+from .replay import robot_of as robot_of
+from .replay import show as show
+from .replay import view_logs as view_logs
+from .transport import SceneRecorder as SceneRecorder
+from .viewer import Viewer as Viewer
+from .watching import Watch as Watch
+from .watching import watch as watch
