@@ -6,6 +6,7 @@ from dataclasses import KW_ONLY, replace
 from typing import Annotated, Any, Self, TypeVar
 
 import numpy as np
+from numpy.typing import ArrayLike
 from pydantic import AfterValidator
 
 from hsp_control.common.errors import ContactError, ControllerError
@@ -22,8 +23,10 @@ from hsp_control.control.planned import (
 )
 from hsp_control.control.setup import Setup
 from hsp_control.declaration import AnyOf, Part, within
+from hsp_control.declaration.given import Given
 from hsp_control.declaration.nested import parts_within
 from hsp_control.declaration.quantities import Flag, Gain, NonNegative, Number
+from hsp_control.declaration.rotation import AnyRotation
 from hsp_control.geometry.scene import Obstacle, Scene, Start
 from hsp_control.null_space.fields import FieldSum, NullSpaceField, Rest
 from hsp_control.tasks import Gains, Impedance, Task
@@ -35,6 +38,7 @@ from hsp_control.trajectories import (
     Trajectory,
     crossfade,
 )
+from hsp_control.trajectories.pose import AnyPose
 from hsp_control.trajectories.streams.stream import stream_for
 from hsp_control.trajectories.streams.streamed import Streamed
 
@@ -326,9 +330,12 @@ class ChangeReference(Change, type="reference"):
 
     task: str
     """Name of the task."""
-    trajectory: Annotated[
-        Trajectory | OrientationTrajectory | PoseTrajectory,
-        AnyOf(PoseTrajectory, Trajectory, OrientationTrajectory),
+    trajectory: Given[
+        Annotated[
+            Trajectory | OrientationTrajectory | PoseTrajectory,
+            AnyOf(PoseTrajectory, Trajectory, OrientationTrajectory),
+        ],
+        AnyRotation | AnyPose,
     ]
     """The new trajectory, in the task's unit; relative values in it refer to
     the robot's pose when the change is made."""
@@ -379,7 +386,7 @@ class MoveObstacle(Change, type="obstacle"):
 
     obstacle: str
     """Name of the obstacle in the scene."""
-    center: Trajectory
+    center: Given[Trajectory, ArrayLike]
     """The new trajectory of its frame's origin in the world [m]; a stream begins where
     the obstacle is."""
 

@@ -36,11 +36,13 @@ from hsp_control.control.setup import Setup
 from hsp_control.declaration import within
 from hsp_control.declaration.nested import parts_within
 from hsp_control.declaration.quantities import Gain
+from hsp_control.declaration.rotation import AnyRotation
 from hsp_control.geometry.scene import Start
 from hsp_control.null_space.fields import NullSpaceField
 from hsp_control.tasks import Gains, Impedance, Task
 from hsp_control.trajectories import Trajectory
 from hsp_control.trajectories.crossfade import AnyReference
+from hsp_control.trajectories.pose import AnyPose
 from hsp_control.trajectories.streams.followed import FollowedStream
 from hsp_control.trajectories.streams.run import StreamRun
 
@@ -101,7 +103,9 @@ class Changes:
         at, ramp = self._at, self._ramp
         return self._do(ChangeImpedance(task, impedance, at=at, ramp=ramp))
 
-    def reference(self, task: str, trajectory: AnyReference) -> Self:
+    def reference(
+        self, task: str, trajectory: AnyReference | AnyRotation | AnyPose
+    ) -> Self:
         """Change the trajectory of a task; see `ChangeReference`."""
         at, ramp = self._at, self._ramp
         return self._do(ChangeReference(task, trajectory, at=at, ramp=ramp))
@@ -122,7 +126,7 @@ class Changes:
         """Change the null-space gain; see `ChangeNullSpaceGain`."""
         return self._do(ChangeNullSpaceGain(gain, at=self._at, ramp=self._ramp))
 
-    def obstacle(self, obstacle: str, center: Trajectory) -> Self:
+    def obstacle(self, obstacle: str, center: Trajectory | ArrayLike) -> Self:
         """Move an obstacle on another trajectory; see `MoveObstacle`."""
         return self._do(MoveObstacle(obstacle, center, at=self._at, ramp=self._ramp))
 

@@ -1,6 +1,6 @@
 """Orientations, as users type them."""
 
-from typing import Annotated, Any
+from typing import Annotated, Any, TypeAlias
 
 import numpy as np
 import pinocchio as pin
@@ -87,3 +87,5 @@ Rotations = Annotated[
     ),
 ]
 """Several of one kind."""
+AnyRotation: TypeAlias = ArrayLike | pin.Quaternion
+"""What an orientation may be given as: see `Rotation`."""

@@ -6,14 +6,17 @@ from typing import Annotated, ClassVar, NamedTuple
 
 import numpy as np
 import pinocchio as pin
+from numpy.typing import ArrayLike
 from pydantic import AfterValidator, Field
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.errors import SceneError, TrajectoryError
 from hsp_control.common.suggestions import did_you_mean, listing
 from hsp_control.declaration import Part
+from hsp_control.declaration.given import Given, default
 from hsp_control.declaration.nested import BY_NAME, parts_within, stored
 from hsp_control.declaration.quantities import ArrayField, Name
+from hsp_control.declaration.rotation import AnyRotation
 from hsp_control.engine.plans import PartCalls
 from hsp_control.geometry.shapes import Shape
 from hsp_control.robot import RobotState
@@ -61,11 +64,11 @@ class Obstacle(Part, error=SceneError):
     """Its name in fields and in the log [-]; in YAML, its key in the scene."""
     shape: Shape
     """Its shape, centred on its own frame [-]."""
-    center: Annotated[Trajectory, AfterValidator(_in_space)]
+    center: Given[Annotated[Trajectory, AfterValidator(_in_space)], ArrayLike]
     """Trajectory of its frame's origin in the world, of dimension 3 [m]."""
-    orientation: Annotated[OrientationTrajectory, AfterValidator(_from_world_axes)] = (
-        HoldOrientation((0.0, 0.0, 0.0))
-    )
+    orientation: Given[
+        Annotated[OrientationTrajectory, AfterValidator(_from_world_axes)], AnyRotation
+    ] = default(HoldOrientation((0.0, 0.0, 0.0)))
     """Trajectory of its frame's orientation, body to world [-]; along the world's axes
     by default. One without a rotation begins along them."""
 

@@ -4,9 +4,11 @@ from dataclasses import KW_ONLY, replace
 from typing import ClassVar, Literal, Self
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from hsp_control import engine
 from hsp_control.common.arrays import Array
+from hsp_control.declaration.given import Given, default
 from hsp_control.declaration.quantities import Axes, Positive
 from hsp_control.engine.plans import PartCall
 from hsp_control.geometry.scene import Start
@@ -25,7 +27,7 @@ class CenterOfMass(TrackingTask, type="center_of_mass"):
     a_x = c_d'' + Kv e' + Kp e + offset; J is the Jacobian of the centre of mass.
     """
 
-    trajectory: Trajectory = Hold()
+    trajectory: Given[Trajectory, ArrayLike] = default(Hold())
     """c_d(t), the trajectory of the centre of mass [m]; held by default."""
     _: KW_ONLY
     axes: Axes = "xyz"
@@ -77,7 +79,7 @@ class AngularMomentum(Task, type="angular_momentum"):
 
     order: ClassVar[Literal[1, 2]] = 1
 
-    trajectory: Trajectory = Hold((0.0, 0.0, 0.0))
+    trajectory: Given[Trajectory, ArrayLike] = default(Hold((0.0, 0.0, 0.0)))
     """ℓ_d(t) in world axes [m²/s], of dimension 3; its velocity is ℓ_d'. Zero by
     default."""
     rate: Positive = 10.0

@@ -10,6 +10,8 @@ import pinocchio as pin
 from hsp_control import engine
 from hsp_control.common.arrays import Array
 from hsp_control.declaration import AnyOf
+from hsp_control.declaration.given import Given, default
+from hsp_control.declaration.rotation import AnyRotation
 from hsp_control.engine.plans import PartCall
 from hsp_control.engine.rotations import quaternion_from_rotation
 from hsp_control.robot import RobotState
@@ -30,6 +32,7 @@ from hsp_control.trajectories import (
     PoseTrajectory,
     Trajectory,
 )
+from hsp_control.trajectories.pose import AnyPose
 
 
 class FrameOrientation(
@@ -46,7 +49,7 @@ class FrameOrientation(
     drawn: ClassVar[tuple[Drawn, ...]] = ("orientation",)
     wrench_unit: ClassVar[str | None] = "N·m"
 
-    trajectory: OrientationTrajectory = HoldOrientation()
+    trajectory: Given[OrientationTrajectory, AnyRotation] = default(HoldOrientation())
     """R_d(t), world ← frame [rad]; held as at the start by default."""
 
     @property
@@ -88,7 +91,10 @@ def _quaternions(desired: Array, actual: Array) -> tuple[Array, Array]:
     return q_d, q if q_d @ q >= 0.0 else -q
 
 
-PoseOrPoint = Annotated[PoseTrajectory | Trajectory, AnyOf(PoseTrajectory, Trajectory)]
+PoseOrPoint = Given[
+    Annotated[PoseTrajectory | Trajectory, AnyOf(PoseTrajectory, Trajectory)],
+    AnyPose,
+]
 """The trajectory of a pose, or of its origin: then the orientation is held."""
 
 
@@ -150,7 +156,7 @@ class FramePose(FrameTask, PoseTask, CompliantTask, type="frame_pose"):
     drawn: ClassVar[tuple[Drawn, ...]] = ("position", "orientation")
     wrench_unit: ClassVar[str | None] = "N and N·m"
 
-    trajectory: PoseOrPoint = ComposedPose()
+    trajectory: PoseOrPoint = default(ComposedPose())
     """The desired pose, world ← frame, or the trajectory of its origin, with the
     orientation of the start [m, rad]; held at the start by default."""
     _: KW_ONLY

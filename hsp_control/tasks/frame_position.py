@@ -4,9 +4,11 @@ from dataclasses import KW_ONLY
 from typing import Any, ClassVar
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from hsp_control import engine
 from hsp_control.common.arrays import Array, Indices
+from hsp_control.declaration.given import Given, default
 from hsp_control.declaration.quantities import Axes
 from hsp_control.engine.plans import PartCall
 from hsp_control.robot import RobotState
@@ -28,7 +30,7 @@ class FramePosition(FrameTask, TrackingTask, CompliantTask, type="frame_position
     drawn: ClassVar[tuple[Drawn, ...]] = ("position",)
     wrench_unit: ClassVar[str | None] = "N"
 
-    trajectory: Trajectory = Hold()
+    trajectory: Given[Trajectory, ArrayLike] = default(Hold())
     """x_d(t), the trajectory of the origin [m]; held at the start by default."""
     _: KW_ONLY
     axes: Axes = "xyz"

@@ -5,9 +5,11 @@ from dataclasses import KW_ONLY, replace
 from typing import Annotated, Any, Self
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.errors import TaskError
+from hsp_control.declaration.given import Given, default
 from hsp_control.declaration.imported import AS_TEXT, NAMED
 from hsp_control.declaration.quantities import PositiveCount
 from hsp_control.geometry.scene import Start
@@ -36,7 +38,7 @@ class FunctionTask(TrackingTask, type="function_task"):
     function: StateFunction
     """y of a state, m numbers or one [in `unit`]; it may use q, t and frames, but not
     v, and must be twice differentiable."""
-    trajectory: Trajectory = Hold()
+    trajectory: Given[Trajectory, ArrayLike] = default(Hold())
     """x_d(t), the trajectory of y [in `unit`]; held at the start by default."""
     _: KW_ONLY
     size: PositiveCount = 1

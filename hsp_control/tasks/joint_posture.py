@@ -4,11 +4,13 @@ from dataclasses import KW_ONLY, replace
 from typing import Any, Self
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from hsp_control import engine
 from hsp_control.common.arrays import Array
 from hsp_control.common.errors import TaskError
 from hsp_control.declaration import within
+from hsp_control.declaration.given import Given, default
 from hsp_control.declaration.quantities import Names
 from hsp_control.engine.plans import PartCall
 from hsp_control.geometry.scene import Start
@@ -34,7 +36,7 @@ class JointPosture(CompliantTask, type="joint_posture"):
     joints: Names | None = None
     """Names of the joints, in the order of the rows [-]; all with one degree of freedom
     by default."""
-    displacement: Trajectory | None = None
+    displacement: Given[Trajectory | None, ArrayLike] = default(None)
     """Motion of the joints about the reference, one number per joint [rad
     or m]; none by default. To stream postures, stream the displacement from a reference
     of zeros."""

@@ -10,7 +10,9 @@ import pinocchio as pin
 from hsp_control import engine
 from hsp_control.common.arrays import Array
 from hsp_control.common.errors import TaskError
+from hsp_control.declaration.given import Given, default
 from hsp_control.declaration.quantities import Vector3
+from hsp_control.declaration.rotation import AnyRotation
 from hsp_control.engine.plans import PartCall
 from hsp_control.robot import RobotState
 from hsp_control.robot.kinematics import FrameKinematics
@@ -45,7 +47,7 @@ class Pointing(FrameTask, type="pointing"):
     _: KW_ONLY
     axis: Vector3 = (0.0, 0.0, 1.0)
     """The pointing axis in the frame, of any length but zero [-]."""
-    trajectory: OrientationTrajectory | None = None
+    trajectory: Given[OrientationTrajectory | None, AnyRotation] = default(None)
     """Instead of `direction`, one that moves: an orientation, world ← desired frame,
     whose third axis is the desired direction [rad]. An omitted orientation is such that
     the axis points along it at the start."""

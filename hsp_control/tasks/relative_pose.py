@@ -8,6 +8,7 @@ import pinocchio as pin
 from hsp_control import engine
 from hsp_control.common.errors import TaskError
 from hsp_control.declaration import within
+from hsp_control.declaration.given import default
 from hsp_control.engine.plans import CallOutput, PartCall
 from hsp_control.geometry.scene import Start
 from hsp_control.robot import Robot, RobotState
@@ -27,7 +28,7 @@ class RelativePose(PoseTask, type="relative_pose"):
 
     frame: str | None = None
     """Name of the frame that is controlled [-]; the robot's end effector by default."""
-    trajectory: PoseOrPoint = ComposedPose()
+    trajectory: PoseOrPoint = default(ComposedPose())
     """The desired pose, reference ← frame, or the trajectory of its origin, with the
     relative orientation of the start [m, rad]; held at the start by default."""
     _: KW_ONLY

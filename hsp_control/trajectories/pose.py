@@ -3,17 +3,19 @@
 from abc import ABC, abstractmethod
 from dataclasses import KW_ONLY, replace
 from functools import cached_property
-from typing import NamedTuple, Self
+from typing import NamedTuple, Self, TypeAlias
 
 import numpy as np
 import pinocchio as pin
+from numpy.typing import ArrayLike
 
 from hsp_control import engine
 from hsp_control.common.arrays import Array
 from hsp_control.common.errors import TrajectoryError
 from hsp_control.declaration import Part
+from hsp_control.declaration.given import Given, default
 from hsp_control.declaration.quantities import Number, Positive, Vector3, numbers
-from hsp_control.declaration.rotation import Rotation, matrix_of
+from hsp_control.declaration.rotation import AnyRotation, Rotation, matrix_of
 from hsp_control.engine.plans import TIME, PartCall, PartCalls, implemented_by
 from hsp_control.engine.rotations import jlog3, log3
 from hsp_control.trajectories.arc_length import Course
@@ -51,6 +53,10 @@ class PoseSample(NamedTuple):
             TrajectorySample(memory[0], memory[1], memory[2]),
             OrientationSample(memory[3:6], memory[6], memory[7]),
         )
+
+
+AnyPose: TypeAlias = ArrayLike | pin.SE3
+"""What a pose may be given as: see `HoldPose`."""
 
 
 class PoseTrajectory(Part, ABC, family="poses", error=TrajectoryError):
@@ -102,9 +108,9 @@ class PoseTrajectory(Part, ABC, family="poses", error=TrajectoryError):
 class ComposedPose(PoseTrajectory, type="composed"):
     """M(t) = (R(t), x(t)), with separate trajectories x and R."""
 
-    position: Trajectory = Hold()
+    position: Given[Trajectory, ArrayLike] = default(Hold())
     """x(t) [m]; held where the robot starts by default."""
-    orientation: OrientationTrajectory = HoldOrientation()
+    orientation: Given[OrientationTrajectory, AnyRotation] = default(HoldOrientation())
     """R(t), body to world; held as the robot starts by default."""
 
     def __post_init__(self) -> None:

@@ -4,11 +4,13 @@ from dataclasses import KW_ONLY, replace
 from typing import Self
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from hsp_control.common.errors import PlanError
 from hsp_control.companions.walking.footsteps import Velocity
 from hsp_control.control.interface import MotionPlan
 from hsp_control.declaration import within
+from hsp_control.declaration.given import Given, default
 from hsp_control.declaration.quantities import Number
 from hsp_control.trajectories import Trajectory
 
@@ -23,7 +25,7 @@ class MovingPlan(MotionPlan):
     """Speed to the left [m/s]."""
     turn: Number = 0.0
     """Rate of turning to the left [rad/s]."""
-    velocity: Trajectory | None = None
+    velocity: Given[Trajectory | None, ArrayLike] = default(None)
     """Instead of these three: all of them as functions of time, for example a stream
     [m/s, m/s, rad/s]."""
 

@@ -12,6 +12,7 @@ from pydantic import AfterValidator
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.errors import ContactError, TrajectoryError
 from hsp_control.declaration import Part, within
+from hsp_control.declaration.given import Given, default
 from hsp_control.declaration.nested import parts_within
 from hsp_control.declaration.quantities import (
     ArrayField,
@@ -52,7 +53,7 @@ class CommandedForce(Part, error=ContactError):
     """A constant command: the normal force, a number [N]; or shape (3,) [N], or
     (6,) [N, N·m]."""
     _: KW_ONLY
-    trajectory: Trajectory | None = None
+    trajectory: Given[Trajectory | None, ArrayLike] = default(None)
     """Instead of `value`: the command over time, of dimension 1, 3 or 6 [N, N·m]."""
 
     def __post_init__(self) -> None:

@@ -11,6 +11,7 @@ from hsp_control import engine
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.errors import FieldError
 from hsp_control.declaration import within
+from hsp_control.declaration.given import Given, default
 from hsp_control.declaration.quantities import Fraction, Names, Weights
 from hsp_control.engine.plans import PartCall
 from hsp_control.geometry.scene import Start
@@ -99,7 +100,7 @@ class TargetPosture(Cost, type="target_posture"):
     _: KW_ONLY
     weights: Weights = 1.0
     """w_i of the joints [1/s], one number or nv."""
-    displacement: Trajectory | None = None
+    displacement: Given[Trajectory | None, ArrayLike] = default(None)
     """Motion of the target: nv numbers that are added to it [rad or m]; none by
     default. A stream can move it only in a change of the running controller."""
 
