@@ -19,8 +19,9 @@ from hsp_control.cli.live_experiment import (
 )
 from hsp_control.cli.loading import read
 from hsp_control.cli.robot_process import RobotProcess
-from hsp_control.common.errors import LiveError, LogError
-from hsp_control.config import Experiment
+from hsp_control.cli.true_run import with_tasks
+from hsp_control.common.errors import HspControlError, LiveError, LogError
+from hsp_control.config import Experiment, load_experiment
 from hsp_control.config.loaded_scenario import load_scenario
 from hsp_control.control.compensation import CompensatedController
 from hsp_control.live import (
@@ -161,7 +162,7 @@ def live(options: argparse.Namespace) -> int:
     out.print(_packets(counts, link.injected, robot_report))
     _print_ends(report, robot_report)
     kept = _convert(loop_log, link=counts, injected=link.injected)
-    kept &= _convert(robot_log)
+    kept &= _convert(robot_log, followed=loop_log.with_suffix(".npz"))
     asked = report.ended == "operator" and not requests.fault
     regular = report.ended == "completed" or (asked and duration == inf)
     if not regular:
@@ -265,16 +266,33 @@ def _print_ends(report: LoopReport, robot_report: dict[str, Any] | None) -> None
         )
 
 
-def _convert(journal: Path, **meta: Any) -> bool:
-    """Convert a journal to an ``.npz`` log, or keep it; return its success."""
+def _convert(journal: Path, followed: Path | None = None, **meta: Any) -> bool:
+    """Convert a journal to an ``.npz`` log, or keep it; return its success.
+
+    Args:
+        journal: The journal of the loop, or of the robot.
+        followed: For the robot's, the log of the loop, which knows what was followed.
+        meta: JSON data to add to the log's.
+    """
+    unknown: HspControlError | None = None
     try:
         rollout = Rollout.load(journal)
         rollout.meta.update(meta)
+        if followed is not None:
+            try:
+                rollout = with_tasks(
+                    rollout, Rollout.load(followed), load_experiment(followed)
+                )
+            except HspControlError as error:
+                unknown = error
         log = rollout.save(journal.with_suffix(".npz"))
     except LogError as error:
         print(f"hsp: {error}", file=sys.stderr)
         return False
     journal.unlink(missing_ok=True)
-    out.print(_summary(rollout))
+    if unknown is None:
+        out.print(_summary(rollout))
+    else:
+        out.print(f"The robot's log has its states only: {unknown}", highlight=False)
     out.print(f"Log: {log}")
     return True

@@ -20,7 +20,6 @@ from hsp_control.common.errors import HardwareError, HspControlError
 from hsp_control.config import Experiment, load_experiment
 from hsp_control.config.streams import without_sources
 from hsp_control.control.measurement import LogChannel
-from hsp_control.control.output import ControlOutput
 from hsp_control.live.hardware import installed
 from hsp_control.live.link import Faults, Link, PacketKind
 from hsp_control.live.live_log import DueRows, live_channels
@@ -250,8 +249,8 @@ def _run(settings: dict[str, Any], stop_reason: Any) -> dict[str, Any]:
 class _RobotLog:
     """The robot's own log: its true states, to the end of its safe stop.
 
-    The controller's columns are computed with the configuration's controller: the robot
-    does not receive the changes that the loop makes while it runs.
+    The columns of tasks and of the law are empty: a robot does not know what the loop
+    follows. `with_tasks` completes them from the loop's log.
     """
 
     def __init__(
@@ -272,30 +271,27 @@ class _RobotLog:
         path = Path(settings["log"])
         scene = experiment.scene
         self.log = LogWriter(experiment.controller, scene, 0, path=path, meta=meta)
-        self.log.warm_up(*self._row(0.0, robot.q, robot.v))
+        self.log.warm_up(*self._row(0.0, robot.q, robot.v), parts=False)
 
     def row(self, t: float, q: Array, v: Array, last: bool) -> None:
         """Write the row of a period, if one is due."""
         robot = self._robot
         self._excess.record(self._controller.limits, q, v)
         if self._due.is_due(t, robot.phase, last=last):
-            self.log.record(*self._row(t, q, v))
+            self.log.record(*self._row(t, q, v), parts=False)
             self._due.written(t, robot.phase)
 
     def _row(
         self, t: float, q: Array, v: Array
-    ) -> tuple[RobotState, ControlOutput | None, Array, dict[str, LogChannel]]:
+    ) -> tuple[RobotState, None, Array, dict[str, LogChannel]]:
         """Return the arguments of `LogWriter.record`."""
         robot, state = self._robot, self._state.update(t, q, v)
-        output: ControlOutput | None = None
-        with suppress(HspControlError):  # then its columns are empty
-            output = self._controller.compute(state)
         log_channels = {
             **live_channels(phase=float(robot.phase)),
             **robot.plant.log_channels(t, q, v, robot.tau),
             **self._excess.collect(self._controller.limits),
         }
-        return state, output, robot.tau, log_channels
+        return state, None, robot.tau, log_channels
 
 
 def _warm_up(robot: SimulatedRobot, experiment: Experiment) -> None:

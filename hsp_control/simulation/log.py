@@ -1,6 +1,6 @@
 """The interface of a log for the summaries of a run: `Rollout` is one."""
 
-from typing import Any, Protocol
+from typing import Any, Protocol, Self
 
 from hsp_control.common.arrays import Array
 
@@ -27,6 +27,9 @@ class Log(Protocol):
     @property
     def tau(self) -> Array:
         """Effort, shape (N, nv)."""
+
+    def before_stop(self) -> Self:
+        """Return the rows before the safe stop of a live run, or all."""
 
     @property
     def status(self) -> str:

@@ -180,6 +180,7 @@ class LogWriter:
         row["joint_positions"][:] = controller.robot.joint_positions(state.q)
         if parts:
             self._tasks.write(state)
+        if parts or not self._placed:
             self._placed = self._place_obstacles(state.t)
         skeleton = row["skeleton"]
         joints = len(skeleton) - len(self._frames)
@@ -211,9 +212,9 @@ class LogWriter:
             placed[obstacle.name] = pin.SE3ToXYZQUAT(obstacle.placement(t))
         return placed
 
-    def warm_up(self, *row: Any) -> None:
+    def warm_up(self, *row: Any, parts: bool = True) -> None:
         """Do everything for a row except writing it; the heading is written."""
-        self.record(*row, keep=False)
+        self.record(*row, keep=False, parts=parts)
 
     def _fill_law(self, state: RobotState, output: ControlOutput) -> None:
         controller, columns = self._controller, self._columns

@@ -43,6 +43,9 @@ _UNREADABLE = (
 )  # fmt: skip
 """The errors of a file that is truncated, damaged, something else or encrypted."""
 
+_RUNNING = 1.0
+"""``live.phase`` before a safe stop: `Phase` is above this layer."""
+
 
 class Rollout:
     """One run: columns of equal length, row i at time t[i], and their descriptions.
@@ -123,11 +126,20 @@ class Rollout:
             return config
         if settings.get("duration", 0.0) is not None:
             return config
-        period, t = settings["log_period"], self.t
-        if "live.phase" in self.columns:
-            t = t[self["live.phase"] == 1.0]  # without its safe stop
+        period, t = settings["log_period"], self.before_stop().t
         rows = round(float(t[-1] - t[0]) / period) if len(t) else 0
         return config | {"simulation": settings | {"duration": max(rows, 1) * period}}
+
+    def before_stop(self) -> Self:
+        """Return the rows of a live run before its safe stop, which follows no task.
+
+        The run itself if it has no safe stop, or nothing else.
+        """
+        stopping = self.columns.get("live.phase", np.zeros(len(self))) > _RUNNING
+        if stopping.all() or not stopping.any():
+            return self
+        columns = {name: each[~stopping] for name, each in self.columns.items()}
+        return type(self)(columns, self.meta)
 
     def measure(self, robot: Robot, function: Callable[[RobotState], Any]) -> Array:
         """Return a function of the state at every row, shape (N, ...).

@@ -36,20 +36,23 @@ def summary_rows(rollout: Log) -> Iterator[tuple[str, str]]:
     if not len(rollout):
         yield "run", f"no rows, {rollout.status}"
         return
-    found = measures(rollout)
+    found, run = measures(rollout), rollout.before_stop()
+    followed = measures(run)
     yield "run", f"{len(rollout)} rows to t = {rollout.t[-1]:g} s, {rollout.status}"
+    if stopping := len(rollout) - len(run):
+        yield "", f"the safe stop is the last {stopping} of them, and follows no task"
     if observed := rollout.meta.get("momentum_observer"):
         yield "momentum observer", observed
         for row in unexplained_rows(rollout):
             yield "", row
-    yield from _task_rows(rollout, found)
+    yield from _task_rows(run, followed)
     yield from force_rows(rollout)
-    first, last = rollout["null_space_norm"][0], found["null_space_error.end"]
+    first, last = run["null_space_norm"][0], followed["null_space_error.end"]
     yield (
         "null space",
         f"|e_N| {first:.3g} {last.unit} at the start, {_text(last)} at the end",
     )
-    if beyond := beyond_limits(rollout):
+    if beyond := beyond_limits(run):
         yield "", beyond
     if "singular_value.min" in found:
         smallest = f"smallest singular value {found['singular_value.min'].value:.3g}"

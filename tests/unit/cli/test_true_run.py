@@ -1,0 +1,89 @@
+"""The robot's log has the tasks that the loop followed, of the robot's own states."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import hsp_control as hsp
+from hsp_control import RobotState, Rollout
+from hsp_control.cli.live_experiment import simulated_robot
+from hsp_control.cli.true_run import with_tasks
+from hsp_control.common.errors import LiveError
+from hsp_control.control.measurement import LogChannel
+from hsp_control.live import InProcessRobot, Phase
+from hsp_control.simulation.log_writer import LogWriter
+
+CONFIG: dict[str, Any] = {
+    "robot": {"name": "panda"},
+    "tasks": {
+        "tip": {"type": "frame_position", "trajectory": {"type": "stream"}},
+        "elbow": {"type": "frame_position", "frame": "panda_link4", "axes": "z",
+                  "priority": 2},
+    },
+    "simulation": {"duration": 0.3, "control_period": 0.001,
+                   "integrator": {"type": "semi_implicit_euler", "step": 0.001}},
+}  # fmt: skip
+
+
+def states_only(run: Rollout, experiment: hsp.Experiment) -> Rollout:
+    """Return a log of the same states as a robot writes it: without a controller."""
+    writer = LogWriter(experiment.controller, experiment.scene, len(run))
+    state, columns = RobotState(experiment.robot), run.meta["columns"]
+    phase = columns["live.phase"]["unit"], columns["live.phase"]["meaning"]
+    for k, t in enumerate(run.t):
+        channels = {"live.phase": LogChannel(min(run["live.phase"][k], 1.0), *phase)}
+        state.update(t, run.q[k], run.v[k])
+        writer.record(state, None, run.tau[k], channels, parts=False)
+    return writer.rollout("completed", "", config=run.config)
+
+
+def test_the_tasks_are_those_of_the_loop(tmp_path: Path) -> None:
+    experiment = hsp.load_experiment(CONFIG)
+    controller = experiment.controller
+    handle = controller.stream("tip")
+    state = RobotState(experiment.robot).update(0.0, experiment.q0, experiment.v0)
+    x, y, z = state.position("panda_hand")
+
+    def steer(t: float) -> None:
+        """Send messages, and change the other task while the loop runs."""
+        handle.send([x, y + 0.1 * t, z])
+        if abs(t - 0.1) < 1e-9:
+            controller.at(0.12).ramp(0.05).gains(
+                "elbow", hsp.Gains(natural_frequency=4.0)
+            )
+
+    report = hsp.run_loop(
+        controller,
+        InProcessRobot(simulated_robot(experiment)),
+        duration=0.3,
+        on_period=steer,
+        log=tmp_path / "loop.journal",
+        meta={"config": experiment.config},
+    )
+    assert report.ended == "completed", report.reason
+    loop = Rollout.load(tmp_path / "loop.journal")
+    truth = states_only(loop, hsp.load_experiment(CONFIG))
+    assert np.isnan(truth["task.tip.error"]).all()
+    path = loop.save(tmp_path / "loop.npz")
+    run = with_tasks(truth, loop, hsp.load_experiment(path))
+    running = loop["live.phase"] == Phase.RUNNING
+    assert running.sum() == 30
+    moved = np.ptp(loop["task.tip.reference"][running], axis=0)
+    assert moved[1] > 0.01
+    for name in loop.columns:
+        if name.startswith(("task.", "field.", "null_space", "acceleration")):
+            scale = 1.0 + np.nanmax(np.abs(loop[name]))
+            np.testing.assert_allclose(
+                run[name][running], loop[name][running], atol=1e-9 * scale, err_msg=name
+            )
+    np.testing.assert_array_equal(run["live.phase"], loop["live.phase"])
+    assert "the safe stop is the last" in str(run)
+
+
+def test_what_a_plan_made_is_said_to_be_missing() -> None:
+    walk = hsp.load_experiment("walking/talos_walk")
+    empty = Rollout({"t": np.zeros(0)}, {})
+    with pytest.raises(LiveError, match="the plan"):
+        with_tasks(empty, empty, walk)
