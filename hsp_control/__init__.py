@@ -17,12 +17,11 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-import lazy_loader
-
 from hsp_control import companions
+from hsp_control.common.public_names import public_names, unknown
 from hsp_control.common.version import __version__ as __version__
 
-_attribute, _, _names = lazy_loader.attach_stub(__name__, __file__)
+_attribute, _, _names = public_names(__name__, __file__)
 _stub = Path(__file__).with_suffix(".pyi").read_text(encoding="utf-8")
 _companions = {*re.findall(r"(?m)^from \.companions import (\w+)", _stub)}
 
@@ -38,7 +37,7 @@ def __getattr__(name: str) -> Any:
     """Return a public name or namespace, imported at its first use (PEP 562)."""
     if name in __dir__():
         return _attribute(name)
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}{_hint(name)}")
+    raise unknown(__name__, name, _hint(name))
 
 
 def _hint(name: str) -> str:

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from hsp_control.common.errors import LogError
 from hsp_control.common.keywords import suggesting
+from hsp_control.common.numbers import check_positive
 from hsp_control.control.controller import Controller
 from hsp_control.control.output import ControlOutput
 from hsp_control.declaration.language import check_kind
@@ -58,8 +59,7 @@ class Recorder:
             LogError: If the period is not positive, or the file cannot be written.
         """
         check_kind("controller is", controller, Controller, LogError)
-        if not 0.0 < log_period < inf:
-            raise LogError(f"log_period is {log_period} s; must be positive")
+        check_positive("log_period", log_period, "s", LogError)
         self.path = None if path is None else Path(path)
         self._folder = TemporaryDirectory() if path is None else None
         where = Path(self._folder.name) / "log" if self._folder else Path(str(path))

@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import takewhile
+from numbers import Real
 from typing import TYPE_CHECKING, Self
 
 import numpy as np
@@ -11,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from hsp_control.common.entry_points import own_names
 from hsp_control.common.errors import ControllerError
+from hsp_control.common.keywords import suggesting_methods
 from hsp_control.common.suggestions import did_you_mean
 from hsp_control.constraints.contacts import CommandedForce
 from hsp_control.constraints.limits import Limits
@@ -68,6 +70,7 @@ __all__ = [
 ]
 
 
+@suggesting_methods
 class Changes:
     """Makes changes that begin at one time: the result of `Controller.at`.
 
@@ -80,6 +83,9 @@ class Changes:
         self, make: Callable[[Change], object], at: float, ramp: float = 0.3
     ) -> None:
         """Set when the changes begin, and how long they take [s]."""
+        for name, value in (("at", at), ("ramp", ramp)):
+            if not isinstance(value, Real):
+                raise ControllerError(f"{name} is {value!r}; needs a number [s]")
         self._make, self._at, self._ramp = make, at, ramp
 
     def ramp(self, duration: float) -> "Changes":

@@ -86,7 +86,8 @@ class Commanded(Composition):
             ControllerError: If there is no such task, or it follows no stream, or
                 nothing follows the given one.
         """
-        return StreamHandle(lambda: self._run_of(of), on_send=self._on_message)
+        place = ("tasks", of) if isinstance(of, str) else ()
+        return StreamHandle(lambda: self._run_of(of), self._on_message, place)
 
     def _on_message(self) -> None:
         """Prepare the step that takes a message.

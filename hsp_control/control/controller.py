@@ -3,7 +3,7 @@
 from collections.abc import Callable, Collection, Mapping, Sequence
 from contextlib import suppress
 from copy import deepcopy
-from math import isfinite
+from math import inf, isfinite
 from time import perf_counter
 
 import numpy as np
@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.errors import ControllerError, NonFiniteError
+from hsp_control.common.numbers import check_positive
 from hsp_control.control.active_stack import ActiveStack
 from hsp_control.control.actuation import Actuation
 from hsp_control.control.bound_mixture import BoundMixture
@@ -25,6 +26,7 @@ from hsp_control.control.first_state import (
 from hsp_control.control.mixture import AccelerationModifier
 from hsp_control.control.model_in_force import ModelInForce
 from hsp_control.control.output import ControlOutput, Diagnostics
+from hsp_control.declaration.language import check_kind
 from hsp_control.engine import Dynamics, Plan
 from hsp_control.law import TaskSample
 from hsp_control.robot import RobotState
@@ -205,8 +207,8 @@ class Controller(Commanded):
 
         Raises:
             ShapeError: If the effort has another shape.
-            NonFiniteError: If the effort or the period contains NaN or inf.
-            ControllerError: If the period is not positive.
+            NonFiniteError: If the effort contains NaN or inf.
+            ControllerError: If the period is no positive number.
         """
         own = self._state.effort  # an array of the same kind needs no conversion
         if (
@@ -216,10 +218,8 @@ class Controller(Commanded):
             or not isfinite(tau.dot(tau))  # half the time of tau @ tau
         ):
             tau = self._declared.robot.check_tangent(tau, "effort tau")
-        if not isfinite(period):
-            raise NonFiniteError(f"period is {period}; needs a finite number")
-        if not period > 0.0:
-            raise ControllerError(f"period is {period} s; must be positive")
+        if type(period) is not float or not 0.0 < period < inf:
+            period = check_positive("period", period, "s", ControllerError)
         self._memory.clock.look(self._state.t, period, self._state.stamp)
         if not self._memory.sent.period:
             state = self._state
@@ -357,6 +357,7 @@ class Controller(Commanded):
         with self._lock:
             mixture = self._in_force.mixture
             if state is not None:
+                check_kind("state is", state, RobotState, ControllerError)
                 self._state.update(state.t, state.q, state.v)
             mixture.bind(mixture.stack_without(lifted, without))
         return perf_counter() - begun

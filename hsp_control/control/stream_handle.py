@@ -8,10 +8,14 @@ import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from hsp_control.common.errors import ControllerError, StreamError
+from hsp_control.common.keywords import suggesting_methods
+from hsp_control.declaration import within
+from hsp_control.declaration.located import KeyPath
 from hsp_control.trajectories.streams.message import Axes
 from hsp_control.trajectories.streams.run import StreamRun
 
 
+@suggesting_methods
 class StreamHandle:
     """A stream of a controller, in its current run; see `Controller.stream`.
 
@@ -21,13 +25,17 @@ class StreamHandle:
     """
 
     def __init__(
-        self, find: Callable[[], StreamRun], on_send: Callable[[], None]
+        self,
+        find: Callable[[], StreamRun],
+        on_send: Callable[[], None],
+        place: KeyPath = (),
     ) -> None:
         """Set the function that returns the stream of the present run.
 
-        ``on_send`` is called with each message.
+        ``on_send`` is called with each message; ``place`` is that of the stream in
+        errors.
         """
-        self._find, self._on_send = find, on_send
+        self._find, self._on_send, self._place = find, on_send, place
         self._last = find()
 
     def _run(self) -> StreamRun:
@@ -53,7 +61,8 @@ class StreamHandle:
         t: float | None = None,
     ) -> None:
         """Send a target, or a velocity; see `StreamRun.send`."""
-        self._followed().send(value, velocity=velocity, axes=axes, t=t)
+        with within(*self._place):
+            self._followed().send(value, velocity=velocity, axes=axes, t=t)
         self._on_send()
 
     def send_chunk(
@@ -65,7 +74,8 @@ class StreamHandle:
         t: float | None = None,
     ) -> None:
         """Send waypoints; see `StreamRun.send_chunk`."""
-        self._followed().send_chunk(values, times, velocities=velocities, t=t)
+        with within(*self._place):
+            self._followed().send_chunk(values, times, velocities=velocities, t=t)
         self._on_send()
 
     def counts(self) -> dict[str, float]:

@@ -13,6 +13,7 @@ import pinocchio as pin
 from hsp_control.common.arrays import Array
 from hsp_control.common.errors import FallError, LiveError
 from hsp_control.common.keywords import suggesting
+from hsp_control.common.numbers import check_positive
 from hsp_control.control.compensation import CompensatedController, Compensation
 from hsp_control.control.controller import Controller
 from hsp_control.control.estimation import Estimator
@@ -203,10 +204,10 @@ def _compensation(controller: Controller, hardware: Hardware) -> Compensation:
 
 
 def _check(period: float, duration: float | None, log_period: float) -> None:
-    if not 0.0 < period < np.inf:
-        raise LiveError(f"the hardware's period is {period} s; must be positive")
-    if duration is not None and not duration > 0.0:
-        raise LiveError(f"duration is {duration} s; must be positive")
+    check_positive("the hardware's period", period, "s", LiveError)
+    if duration is not None and duration != np.inf:
+        check_positive("duration", duration, "s", LiveError)
+    check_positive("log_period", log_period, "s", LiveError)
     if not log_period >= period * (1.0 - 1e-9):
         raise LiveError(
             f"log_period is {log_period:g} s; must be a period, {period:g} s, or longer"

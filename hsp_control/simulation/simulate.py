@@ -15,6 +15,7 @@ from hsp_control.common.errors import (
     StreamError,
 )
 from hsp_control.common.keywords import suggesting
+from hsp_control.common.numbers import check_positive
 from hsp_control.common.warned import warn
 from hsp_control.control.change_model import ChangeGravity, ChangePayload
 from hsp_control.control.compensation import CompensatedController, Compensation
@@ -326,8 +327,7 @@ def check_steps(duration: float, step: float, name: str) -> None:
 def _whole(total: float, part: float, total_name: str, part_name: str) -> int:
     """Return total/part if it is a whole number."""
     for value, name in ((total, total_name), (part, part_name)):
-        if not 0.0 < value < np.inf:
-            raise SimulationError(f"{name} is {value} s; must be positive")
+        check_positive(name, value, "s", SimulationError)
     ratio = total / part
     if not ratio < 2**53:  # every larger float is a whole number
         raise SimulationError(

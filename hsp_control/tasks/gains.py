@@ -109,7 +109,7 @@ def as_gain(value: ArrayLike, name: str) -> Array:
 def as_numbers(value: ArrayLike, name: str) -> Array:
     """Return a number, one per row, or a square matrix, as an array."""
     try:
-        if isinstance(value, str):
+        if isinstance(value, str) or np.asarray(value).dtype == bool:
             raise TypeError
         gain = np.array(value, dtype=float)
     except (TypeError, ValueError):

@@ -1,5 +1,5 @@
 """Runs in Rerun's viewer."""
 
-import lazy_loader
+from hsp_control.common.public_names import public_names
 
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+__getattr__, __dir__, __all__ = public_names(__name__, __file__)

@@ -8,10 +8,9 @@ from pathlib import Path
 from threading import Thread
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from hsp_control.common.errors import SweepError
 from hsp_control.common.keywords import suggesting
+from hsp_control.common.numbers import check_positive
 from hsp_control.companions.sweeps.design import chosen_design, points
 from hsp_control.companions.sweeps.factor import factors
 from hsp_control.companions.sweeps.plan import SweepPlan
@@ -99,8 +98,8 @@ def sweep(
 
     if luggage.reading:
         raise luggage.SweepReachedError
-    if time_limit is not None and not 0.0 < time_limit < np.inf:
-        raise SweepError(f"time_limit is {time_limit} s; must be positive")
+    if time_limit is not None:
+        check_positive("time_limit", time_limit, "s", SweepError)
     if workers is not None and workers < 1:
         raise SweepError(f"{workers} workers; needs at least 1")
     if workers is not None and scheduler is not None:

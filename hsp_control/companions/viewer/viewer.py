@@ -10,6 +10,7 @@ import pinocchio as pin
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.errors import ExportError, LogError, ViewerError
+from hsp_control.common.numbers import check_positive
 from hsp_control.companions.viewer import transport
 from hsp_control.companions.viewer.clip import bands_of, remove_clip, set_clip
 from hsp_control.companions.viewer.commands import (
@@ -381,8 +382,7 @@ class Viewer:
 
     def _playing(self, speed: float | None, loop: bool | None) -> Mapping[str, Any]:
         speed = self.view.speed if speed is None else speed
-        if not 0.0 < speed < float("inf"):
-            raise ViewerError(f"speed {speed} must be positive")
+        speed = check_positive("speed", speed, "", ViewerError)
         return {"speed": speed, "loop": self.view.loop if loop is None else loop}
 
     def _move_others(self, time: float) -> list[PageCommand]:

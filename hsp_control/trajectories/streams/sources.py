@@ -9,6 +9,7 @@ from weakref import WeakValueDictionary, ref
 from hsp_control.common.entry_points import entry_points
 from hsp_control.common.errors import StreamError
 from hsp_control.common.regular_file import why_endless
+from hsp_control.common.suggestions import did_you_mean
 from hsp_control.trajectories.streams.inbox import Inbox
 from hsp_control.trajectories.streams.message import Message, Space, message_of, parsed
 
@@ -75,10 +76,12 @@ def kind_of(source: str) -> AddressKind:
     if found := kinds.get(source.partition("://")[0]):
         kind: AddressKind = found.load()
         return kind
-    schemes = " or ".join(f"{name}://" for name in sorted(kinds)) or "none"
+    schemes = [f"{name}://" for name in sorted(kinds)]
+    meant = did_you_mean(f"{source.partition('://')[0]}://", schemes)
     raise StreamError(
-        f"source is {source!r}; an address begins with {schemes}, and the path of a "
-        "recording contains no '://'"
+        f"source is {source!r}{f'{meant} An' if meant else '; an'} address begins with "
+        f"{' or '.join(schemes) or 'none'}, and the path of a recording contains no "
+        "'://'"
     )
 
 

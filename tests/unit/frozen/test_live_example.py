@@ -9,6 +9,7 @@ import pytest
 from frozen_runs import EXAMPLE, compiled
 
 import hsp_control as hsp
+from hsp_control.cli.true_run import with_tasks
 
 
 @pytest.mark.process
@@ -20,7 +21,8 @@ def test_a_loop_in_cpp_moves_the_simulated_arm(tmp_path: Path) -> None:
     assert done.returncode == 0, done.stderr
     assert " 0 refused" in done.stdout
     assert "the loop closed the connection" in done.stdout
-    log = hsp.Rollout.load(tmp_path / "panda_limits-robot.journal")
+    states = hsp.Rollout.load(tmp_path / "panda_limits-robot.journal")
+    log = with_tasks(states, states, hsp.load_experiment("panda_limits"))
     # The hand has moved, and is on its circle.
     error = np.linalg.norm(log["task.hand.error"], axis=1)
     actual = log["task.hand.actual"]

@@ -1,0 +1,82 @@
+"""What is mistyped in Python is named: arguments, numbers, and names of modules."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+import hsp_control as hsp
+from hsp_control.common.errors import (
+    ControllerError,
+    GainError,
+    LiveError,
+    SimulationError,
+    StreamError,
+)
+from hsp_control.live import InProcessRobot, SimulatedRobot
+
+Made = Callable[[hsp.Controller], Any]
+
+
+def controller(**options: Any) -> hsp.Controller:
+    task = hsp.FramePosition("panda_hand", hsp.Stream())
+    return hsp.Controller(hsp.Robot.load("panda"), [task], **options)
+
+
+def still(c: hsp.Controller) -> InProcessRobot:
+    """Return a robot at rest."""
+    model, rk4 = hsp.plants.RigidBodyPlant(c.robot), hsp.integrators.Rk4(0.001)
+    plant, rest = hsp.plants.IntegratedPlant(model, rk4), np.zeros(c.robot.nv)
+    return InProcessRobot(SimulatedRobot(plant, c.robot.home(), rest, 0.001))
+
+
+@pytest.mark.parametrize(("mistake", "error", "message"), [
+    (lambda c: hsp.simulate(c, c.robot.home(), duration="1"),
+     SimulationError, r"duration is '1'; needs a positive number \[s\]"),
+    (lambda c: c.applied(np.zeros(7), "1ms"), ControllerError, "period is '1ms'"),
+    (lambda c: c.applied(np.zeros(7), np.nan), ControllerError, "period is nan s"),
+    (lambda c: hsp.run_loop(c, still(c), duration="1"), LiveError, "duration is '1'"),
+    (lambda c: c.prepare("home"), ControllerError, "state is 'home', a str"),
+    (lambda c: c.at("1"), ControllerError, "at is '1'; needs a number"),
+    (lambda c: c.at(1).ramp("1"), ControllerError, "ramp is '1'; needs a number"),
+    (lambda c: c.at(1).payload("panda_hand", mas=1), TypeError, "did you mean 'mass'"),
+    (lambda c: c.at(1).payload(), TypeError, "payload: missing .*'frame'"),
+    (lambda c: c.stream("panda_hand").send(vel=[1, 0, 0]),
+     TypeError, "did you mean 'velocity'"),
+    (lambda c: c.stream("panda_hand").send([1, 0]),
+     StreamError, "^tasks.panda_hand: value has 2 numbers; .* needs 3"),
+    (lambda c: controller(null_space_gain=True), GainError, "is True; needs numbers"),
+    (lambda c: hsp.Stream(source="upd://127.0.0.1:5000"),
+     StreamError, "did you mean 'udp://'"),
+])  # fmt: skip
+def test_it_is_named(mistake: Made, error: type[Exception], message: str) -> None:
+    with pytest.raises(error, match=message):
+        mistake(controller())
+
+
+@pytest.mark.parametrize(("look_up", "meant"), [
+    (lambda: hsp.FramPose, "FramePose"),
+    (lambda: hsp.plots.draw_eforts, "draw_efforts"),
+])  # fmt: skip
+def test_python_says_which_name_was_meant(
+    look_up: Callable[[], Any], meant: str
+) -> None:
+    """A traceback suggests names of the object that an AttributeError carries."""
+    with pytest.raises(AttributeError) as raised:
+        look_up()
+    assert meant in dir(raised.value.obj)
+    assert raised.value.name not in dir(raised.value.obj)
+
+
+def test_an_error_inside_a_method_stays_what_it_is() -> None:
+    """A TypeError of the body is not taken for one of the call."""
+
+    def field(t: float, q: Any, v: Any) -> Any:
+        raise TypeError("mine")
+
+    cost = hsp.FunctionCost(lambda state: field(0.0, 0.0, 0.0))
+    with pytest.raises(Exception, match="mine"):
+        hsp.simulate(
+            controller(field=cost), hsp.Robot.load("panda").home(), duration=0.1
+        )
