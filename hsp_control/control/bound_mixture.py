@@ -171,13 +171,14 @@ class BoundMixture:
             if share:
                 self.active, stack.share = stack, share
                 self.damped = self.damped or stack.damped
-        delivered, status = self._mean, self._worst.item()
-        if delivered.forces.size:
-            columns = self._whole.columns(self.active.support)
-            delivered = delivered._replace(forces=delivered.forces[columns])
-        if status == 0:
-            return delivered
-        return delivered._replace(status=STATUSES[status], relaxation=self._relaxation)
+        mean, status, forces = self._mean, self._worst.item(), self._mean.forces
+        if forces.size:
+            forces = forces[self._whole.columns(self.active.support)]
+        relaxation = self._relaxation if status else mean.relaxation
+        # Not `_replace`: its tuples would wake the garbage collector.
+        return Delivered(
+            mean.effort, mean.acceleration, forces, STATUSES[status], relaxation
+        )
 
     @property
     def _relaxation(self) -> float:

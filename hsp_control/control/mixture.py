@@ -310,7 +310,7 @@ class Mixture:
         self, standing: Sequence[PlannedContact], off: Collection[int]
     ) -> ActiveStack:
         """Return the stack of some contacts and of the active tasks."""
-        known = tuple(map(id, standing)), frozenset(off)
+        known = (*map(id, standing),), frozenset(off)
         found = self._active.get(known)
         if found is None:
             found = self._active[known] = self._made(standing, known[1])

@@ -331,7 +331,10 @@ class Actuation:
         found = self.outcome
         if self._qp and self.direct and not self._qp_outcome.unsolved.item():
             status, relaxation = self._qp.found()
-            return self.nearest._replace(status=status, relaxation=relaxation)
+            own = self.nearest  # not `_replace`: see `BoundMixture.make`
+            return Delivered(
+                own.effort, own.acceleration, own.forces, status, relaxation
+            )
         if self.direct and not found.violated.item() and offset is None:
             return Delivered(self._state.effort, a, self.own.forces, EXACT, 0.0)
         motion_ok = not (found.motion.item() or found.rows.item())
