@@ -49,6 +49,9 @@ def still(c: hsp.Controller) -> InProcessRobot:
     (lambda c: controller(null_space_gain=True), GainError, "is True; needs numbers"),
     (lambda c: hsp.Stream(source="upd://127.0.0.1:5000"),
      StreamError, "did you mean 'udp://'"),
+    (lambda c: hsp.Controller(c.robot, [
+        hsp.FramePosition("panda_hand", hsp.Stream(source="nosuch.jsonl"))]),
+     StreamError, r"^tasks.panda_hand.trajectory.source: nosuch.jsonl: .* be read"),
 ])  # fmt: skip
 def test_it_is_named(mistake: Made, error: type[Exception], message: str) -> None:
     with pytest.raises(error, match=message):
