@@ -132,7 +132,7 @@ def test_nonsensical_input_is_refused(
     log: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["view", str(log), "--speed", "0"]) == 2
-    assert "speed 0.0 must be positive" in capsys.readouterr().err
+    assert "speed is 0.0; must be positive" in capsys.readouterr().err
     assert main(["view", str(log).replace("obstacle", "obstacel")]) == 2
     assert f"did you mean '{log}'" in capsys.readouterr().err
 

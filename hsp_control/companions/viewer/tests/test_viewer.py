@@ -220,7 +220,7 @@ def resampled(run: Rollout, rows: int) -> Rollout:
 
 def test_unplayable_sources_are_refused(arm: Robot, run: Rollout) -> None:
     viewer = Viewer(arm, transport=Recorder())
-    with pytest.raises(ViewerError, match="speed -1 must be positive"):
+    with pytest.raises(ViewerError, match="speed is -1; must be positive"):
         viewer.play(run, speed=-1)
     with pytest.raises(ViewerError, match=r"ings: camra: .*did you mean 'camera'"):
         Viewer(arm, transport=Recorder(), camra=[1, 2, 3])
