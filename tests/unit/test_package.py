@@ -162,3 +162,9 @@ def test_a_shell_completes_without_the_engine(
     )
     assert answer.read_text().strip("\013") == offered
     assert not found & HEAVY
+
+
+@pytest.mark.process
+def test_all_names_can_be_imported_at_once() -> None:
+    """Lazy-loader's own switch for finding errors of imports, which users may set."""
+    assert imported("import hsp_control", EAGER_IMPORT="1") >= HEAVY

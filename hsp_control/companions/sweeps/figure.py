@@ -21,9 +21,10 @@ from hsp_control.companions.plots.figures import (
     save_figure,
     styled,
 )
-from hsp_control.companions.sweeps import Sensitivity, Sweep
+from hsp_control.companions.sweeps.results import Sweep
 from hsp_control.companions.sweeps.sensitivities import (
     MIN_RUNS,
+    Sensitivity,
     has_order,
     influences,
 )
