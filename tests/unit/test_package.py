@@ -167,4 +167,5 @@ def test_a_shell_completes_without_the_engine(
 @pytest.mark.process
 def test_all_names_can_be_imported_at_once() -> None:
     """Lazy-loader's own switch for finding errors of imports, which users may set."""
-    assert imported("import hsp_control", EAGER_IMPORT="1") >= HEAVY
+    modules = imported("import hsp_control", EAGER_IMPORT="1")
+    assert {"hsp_control.tasks", "hsp_control.companions.sweeps.results"} <= modules

@@ -4,7 +4,8 @@ import signal
 import socket
 import subprocess
 import sys
-from contextlib import closing
+from collections.abc import Callable
+from contextlib import closing, suppress
 from io import BytesIO
 from math import pi
 from typing import Any
@@ -14,7 +15,7 @@ import pytest
 
 from hsp_control import Robot
 from hsp_control.common.arrays import Array
-from hsp_control.common.errors import HardwareError
+from hsp_control.common.errors import HardwareError, LiveError
 from hsp_control.common.silence import Silence
 from hsp_control.companions.franka import (
     FrankaHardware,
@@ -193,6 +194,37 @@ def test_a_gripper_s_process_that_hangs_is_noticed(
         assert process.trouble() == "has sent nothing for 5 s"
         theirs.send(client.ALIVE)
         assert not process.trouble()
+
+
+def how_many(call: Callable[[], object]) -> int:
+    """Return how often a call succeeds before it would wait."""
+    count = 0
+    with suppress(BlockingIOError):
+        while True:
+            call()
+            count += 1
+    return count
+
+
+def test_a_gripper_s_process_without_a_pause_does_not_hold_the_loop() -> None:
+    """As many messages as a socket holds: a period reads a few of them."""
+    process = ClientProcess.__new__(ClientProcess)
+    process._link, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    process._silence = Silence(0.0)
+    with closing(theirs), closing(process._link):
+        theirs.setblocking(False)
+        sent = how_many(lambda: theirs.send(client.ALIVE))
+        assert not process.trouble()
+        process._link.setblocking(False)
+        left = how_many(lambda: process._link.recv(client.LONGEST))
+    assert sent > 100
+    assert 0 < sent - left <= 20
+
+
+@pytest.mark.parametrize("port", [0, 65536, 70000])
+def test_a_port_that_is_none_is_named(port: int) -> None:
+    with pytest.raises(LiveError, match=rf"gripper: port {port} is not between 1 and"):
+        FrankaSettings("10.0.0.1", gripper=f"udp://127.0.0.1:{port}")
 
 
 def test_both_processes_end_after_any_exception() -> None:
