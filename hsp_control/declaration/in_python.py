@@ -107,11 +107,18 @@ class _Words(str):
 _ARRAY_LIKE = set(get_args(ArrayLike)) or {ArrayLike}  # since NumPy 2.5 one name
 
 
+def _is_type(annotation: Any) -> bool:
+    unions = Union, UnionType
+    plain = isinstance(annotation, type) or get_origin(annotation) in unions
+    return plain or annotation == ArrayLike
+
+
 def _words(annotation: Any) -> str:
     """Return a type as one writes it: a checked number is a float."""
     origin, args = get_origin(annotation), get_args(annotation)
     if origin is Annotated:
-        return _words(args[0])
+        given = [each for each in args[1:] if _is_type(each)]  # see `Given`
+        return _words(Union[args[0], *given])
     if origin in (Union, UnionType):
         words = ["ArrayLike"] if set(args) >= _ARRAY_LIKE else []
         rest = [each for each in args if not words or each not in _ARRAY_LIKE]
