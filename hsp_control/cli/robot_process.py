@@ -19,6 +19,8 @@ from hsp_control.common.arrays import Array
 from hsp_control.common.errors import HardwareError, HspControlError
 from hsp_control.config import Experiment, load_experiment
 from hsp_control.config.streams import without_sources
+from hsp_control.control.controller import Controller
+from hsp_control.control.fitting import Base
 from hsp_control.control.measurement import LogChannel
 from hsp_control.live.hardware import installed
 from hsp_control.live.link import Faults, Link, PacketKind
@@ -249,14 +251,14 @@ def _run(settings: dict[str, Any], stop_reason: Any) -> dict[str, Any]:
 class _RobotLog:
     """The robot's own log: its true states, to the end of its safe stop.
 
-    The columns of tasks and of the law are empty: a robot does not know what the loop
-    follows. `with_tasks` completes them from the loop's log.
+    There are no tasks in it: a robot does not know what the loop follows. `with_tasks`
+    adds them from the loop's log.
     """
 
     def __init__(
         self, experiment: Experiment, robot: SimulatedRobot, settings: dict[str, Any]
     ) -> None:
-        self._controller, self._robot = experiment.controller, robot
+        self._robot, self._limits = robot, experiment.controller.limits
         self._due = DueRows(settings["log_period"])
         self._state = RobotState(experiment.robot)
         self._excess = LimitExcess(experiment.robot)
@@ -270,13 +272,15 @@ class _RobotLog:
         }
         path = Path(settings["log"])
         scene = experiment.scene
-        self.log = LogWriter(experiment.controller, scene, 0, path=path, meta=meta)
+        base: Base | None = "flying" if experiment.robot.unactuated else None
+        nothing = Controller(experiment.robot, (), base=base, scene=scene)
+        self.log = LogWriter(nothing, scene, 0, path=path, meta=meta)
         self.log.warm_up(*self._row(0.0, robot.q, robot.v), parts=False)
 
     def row(self, t: float, q: Array, v: Array, last: bool) -> None:
         """Write the row of a period, if one is due."""
         robot = self._robot
-        self._excess.record(self._controller.limits, q, v)
+        self._excess.record(self._limits, q, v)
         if self._due.is_due(t, robot.phase, last=last):
             self.log.record(*self._row(t, q, v), parts=False)
             self._due.written(t, robot.phase)
@@ -289,7 +293,7 @@ class _RobotLog:
         log_channels = {
             **live_channels(phase=float(robot.phase)),
             **robot.plant.log_channels(t, q, v, robot.tau),
-            **self._excess.collect(self._controller.limits),
+            **self._excess.collect(self._limits),
         }
         return state, None, robot.tau, log_channels
 

@@ -36,7 +36,6 @@ def with_tasks(truth: Rollout, loop: Rollout, repeated: Experiment) -> Rollout:
             output = controller.compute(state)
         writer.record(state, output, tau, {})
     run = writer.rollout(truth.status, truth.meta["message"])
-    came = {k: run.meta[k] for k in ("tasks", "changes", "streams") if k in run.meta}
     described = {"columns": truth.meta["columns"] | run.meta["columns"]}
     # Excesses are the largest between two rows, which only the robot knows.
     columns = {**truth.columns, **run.columns}
@@ -45,4 +44,4 @@ def with_tasks(truth: Rollout, loop: Rollout, repeated: Experiment) -> Rollout:
     latest = np.searchsorted(loop.t, truth.t, side="right") - 1
     phases = loop["live.phase"][latest.clip(0)]
     columns["live.phase"] = np.maximum(truth["live.phase"], phases)
-    return Rollout(columns, truth.meta | came | described)
+    return Rollout(columns, truth.meta | run.meta | described)

@@ -45,22 +45,10 @@ def summary_rows(rollout: Log) -> Iterator[tuple[str, str]]:
         yield "momentum observer", observed
         for row in unexplained_rows(rollout):
             yield "", row
-    yield from _task_rows(run, followed)
-    yield from force_rows(rollout)
-    first, last = run["null_space_norm"][0], followed["null_space_error.end"]
-    yield (
-        "null space",
-        f"|e_N| {first:.3g} {last.unit} at the start, {_text(last)} at the end",
-    )
-    if beyond := beyond_limits(run):
-        yield "", beyond
-    if "singular_value.min" in found:
-        smallest = f"smallest singular value {found['singular_value.min'].value:.3g}"
-        least = found["manipulability.min"].value
-        if np.isfinite(least):
-            yield "det(J W⁻¹ Jᵀ)", f"minimum {least:.4g}, {smallest}"
-        else:  # determinants of different sizes are not comparable
-            yield "J L⁻ᵀ", smallest
+    if np.isfinite(run["null_space_norm"]).any():
+        yield from _law_rows(run, followed)
+    else:  # the log of a robot
+        yield "tasks", "not in this log, which has states only"
     for name in distances(rollout):
         text = f"minimum {found[f'distance.{name}.min'].value:.3g} m"
         least = rollout.meta["columns"][f"distance.{name}"].get("minimum")
@@ -80,6 +68,26 @@ def summary_rows(rollout: Log) -> Iterator[tuple[str, str]]:
         yield "limits", text
     if damped := damped_rows(rollout):
         yield "singular", f"{damped} rows: the law was damped there, not exact"
+
+
+def _law_rows(run: Log, found: Mapping[str, Measure]) -> Iterator[tuple[str, str]]:
+    """Yield the rows of tasks, forces, null space and singular values."""
+    yield from _task_rows(run, found)
+    yield from force_rows(run)
+    first, last = run["null_space_norm"][0], found["null_space_error.end"]
+    yield (
+        "null space",
+        f"|e_N| {first:.3g} {last.unit} at the start, {_text(last)} at the end",
+    )
+    if beyond := beyond_limits(run):
+        yield "", beyond
+    if "singular_value.min" in found:
+        smallest = f"smallest singular value {found['singular_value.min'].value:.3g}"
+        least = found["manipulability.min"].value
+        if np.isfinite(least):
+            yield "det(J W⁻¹ Jᵀ)", f"minimum {least:.4g}, {smallest}"
+        else:  # determinants of different sizes are not comparable
+            yield "J L⁻ᵀ", smallest
 
 
 def damped_rows(rollout: Log) -> int:

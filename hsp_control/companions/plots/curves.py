@@ -325,7 +325,8 @@ def draw_singular_values(axes: Axes, rollout: Rollout) -> None:
     values = rollout["singular_values"]
     names = [f"σ{k + 1}".translate(_SUBSCRIPTS) for k in range(values.shape[1])]
     draw_lines(axes, rollout.t, values, names)
-    if float(np.nanmin(values)) < 0.05 * float(np.nanmax(values)):
+    known = values[np.isfinite(values)]
+    if known.size and known.min() < 0.05 * known.max():
         log_scale(axes, values)
     else:
         axes.set_ylim(bottom=0.0)

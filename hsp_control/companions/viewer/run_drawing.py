@@ -60,7 +60,8 @@ def all_layers(
             "distances": distances(controller, f"{root}/distances", ink),
             "capsules": capsules(controller, f"{root}/capsules"),
         }
-        if "field.g" in motion.rows:
+        # A robot's own log has no field.
+        if "field.g" in motion.rows and np.isfinite(motion.rows["field.g"]).any():
             arrows = self_motion(controller, motion, f"{root}/self_motion")
             layers["self_motion"] = arrows
     return layers

@@ -11,8 +11,8 @@ from hsp_control import RobotState, Rollout
 from hsp_control.cli.live_experiment import simulated_robot
 from hsp_control.cli.true_run import with_tasks
 from hsp_control.common.errors import LiveError
-from hsp_control.control.measurement import LogChannel
 from hsp_control.live import InProcessRobot, Phase
+from hsp_control.live.live_log import live_channels
 from hsp_control.simulation.log_writer import LogWriter
 
 CONFIG: dict[str, Any] = {
@@ -29,13 +29,12 @@ CONFIG: dict[str, Any] = {
 
 def states_only(run: Rollout, experiment: hsp.Experiment) -> Rollout:
     """Return a log of the same states as a robot writes it: without a controller."""
-    writer = LogWriter(experiment.controller, experiment.scene, len(run))
-    state, columns = RobotState(experiment.robot), run.meta["columns"]
-    phase = columns["live.phase"]["unit"], columns["live.phase"]["meaning"]
-    for k, t in enumerate(run.t):
-        channels = {"live.phase": LogChannel(min(run["live.phase"][k], 1.0), *phase)}
-        state.update(t, run.q[k], run.v[k])
-        writer.record(state, None, run.tau[k], channels, parts=False)
+    nothing = hsp.Controller(experiment.robot, (), scene=experiment.scene)
+    writer = LogWriter(nothing, experiment.scene, len(run))
+    state = RobotState(experiment.robot)
+    for t, q, v, tau in zip(run.t, run.q, run.v, run.tau, strict=True):
+        phase = live_channels(phase=float(Phase.RUNNING))
+        writer.record(state.update(t, q, v), None, tau, phase, parts=False)
     return writer.rollout("completed", "", config=run.config)
 
 
@@ -65,7 +64,7 @@ def test_the_tasks_are_those_of_the_loop(tmp_path: Path) -> None:
     assert report.ended == "completed", report.reason
     loop = Rollout.load(tmp_path / "loop.journal")
     truth = states_only(loop, hsp.load_experiment(CONFIG))
-    assert np.isnan(truth["task.tip.error"]).all()
+    assert not truth.meta["tasks"]
     path = loop.save(tmp_path / "loop.npz")
     run = with_tasks(truth, loop, hsp.load_experiment(path))
     running = loop["live.phase"] == Phase.RUNNING
@@ -87,3 +86,14 @@ def test_what_a_plan_made_is_said_to_be_missing() -> None:
     empty = Rollout({"t": np.zeros(0)}, {})
     with pytest.raises(LiveError, match="the plan"):
         with_tasks(empty, empty, walk)
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_log_of_states_is_summed_up_drawn_and_exported(tmp_path: Path) -> None:
+    experiment = hsp.load_experiment(CONFIG)
+    log = states_only(experiment.run(), experiment)
+    log.meta["config"] = experiment.config
+    assert "not in this log, which has states only" in str(log)
+    assert "nan" not in str(log)
+    hsp.plots.diagnostics_figure(log)
+    hsp.viewer.export_html(log, tmp_path / "page.html")
