@@ -28,7 +28,8 @@ def with_tasks(truth: Rollout, loop: Rollout, repeated: Experiment) -> Rollout:
     if repeated.scenario.plan is not None:
         raise LiveError("what the plan made is in the loop's log")
     controller, state = repeated.controller, RobotState(repeated.robot)
-    writer = LogWriter(controller, repeated.scene, len(truth))
+    config = {"config": truth.meta.get("config")}
+    writer = LogWriter(controller, repeated.scene, len(truth), meta=config)
     for t, q, v, tau in zip(truth.t, truth.q, truth.v, truth.tau, strict=True):
         state.update(t, q, v)
         output: ControlOutput | None = None
@@ -36,7 +37,6 @@ def with_tasks(truth: Rollout, loop: Rollout, repeated: Experiment) -> Rollout:
             output = controller.compute(state)
         writer.record(state, output, tau, {})
     run = writer.rollout(truth.status, truth.meta["message"])
-    described = {"columns": truth.meta["columns"] | run.meta["columns"]}
     # Excesses are the largest between two rows, which only the robot knows.
     columns = {**truth.columns, **run.columns}
     columns |= {name: truth[name] for name in (POSITION, VELOCITY)}
@@ -44,4 +44,6 @@ def with_tasks(truth: Rollout, loop: Rollout, repeated: Experiment) -> Rollout:
     latest = np.searchsorted(loop.t, truth.t, side="right") - 1
     phases = loop["live.phase"][latest.clip(0)]
     columns["live.phase"] = np.maximum(truth["live.phase"], phases)
-    return Rollout(columns, truth.meta | run.meta | described)
+    meta = truth.meta | run.meta
+    meta["columns"] = truth.meta["columns"] | run.meta["columns"]
+    return Rollout(columns, meta)

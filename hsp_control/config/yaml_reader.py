@@ -61,7 +61,10 @@ def _number(text: str) -> float:
 
 
 def _text(text: str) -> str:
-    text.encode()  # raises for half of a surrogate pair, as in "\ud800"
+    try:
+        text.encode()
+    except UnicodeEncodeError:  # JSON writes "\ud83e\udd16"; half a pair raises again
+        return text.encode("utf-16", "surrogatepass").decode("utf-16")
     return text
 
 

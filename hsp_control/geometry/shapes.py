@@ -18,6 +18,7 @@ import numpy as np
 from hsp_control.common.arrays import Array
 from hsp_control.common.entry_points import own_names
 from hsp_control.common.errors import SceneError
+from hsp_control.common.regular_file import why_endless
 from hsp_control.declaration import Part
 from hsp_control.declaration.families import value_fields
 from hsp_control.declaration.quantities import (
@@ -213,6 +214,8 @@ class Mesh(Shape, type="mesh"):
 
     def _load(self) -> tuple[Any, Array]:
         file = Path(self.file)
+        if "\0" not in str(file) and (why := why_endless(file)):
+            raise SceneError(f"mesh: {file}: {why}")
         if "\0" in str(file) or not file.is_file():
             raise SceneError(f"mesh: no such file {file}")
         if reason := mesh_files.find_problem(file):

@@ -113,7 +113,7 @@ def command_it_now(reported: str) -> None:
     assert len(errors) == 2
     assert max(errors) < 0.5
     assert "at the end 0.00 m/s" in reported
-    assert "StreamError · value contains nan" in reported
+    assert "StreamError · tasks.hand: value contains nan" in reported
     stretched = re.findall(r"N/m: (\S+) mm, F/K = (\S+) mm", reported)
     assert len(stretched) == 2
     for moved, promised in stretched:

@@ -1,5 +1,6 @@
 """Values read from a text, and every message about a text that is not YAML."""
 
+import json
 import os
 import re
 from pathlib import Path
@@ -100,6 +101,12 @@ UNREADABLE = [
         for i in range(48)) + "*a" + "}" * 48,
      "1: nested deeper than 50 levels"),
 ]  # fmt: skip
+
+
+def test_json_s_pairs_are_one_character() -> None:
+    """JSON escapes what is beyond U+FFFF as two surrogates, and JSON is YAML."""
+    data, _ = yaml_reader.read_yaml(json.dumps({"\N{ROBOT FACE}": "\N{ROBOT FACE}"}))
+    assert data == {"\N{ROBOT FACE}": "\N{ROBOT FACE}"}
 
 
 @pytest.mark.parametrize(("text", "expected"), UNREADABLE)

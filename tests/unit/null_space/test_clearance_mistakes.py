@@ -1,6 +1,7 @@
 """Wrong shapes, obstacles and starts in contact are refused by name."""
 
 import json
+import os
 import re
 from collections.abc import Callable
 from pathlib import Path
@@ -59,9 +60,16 @@ MISTAKES: list[tuple[Callable[[Path], Any], type[HspControlError], str]] = [
      SceneError, "... /no.stl"),
     (lambda at: Mesh(at / "no.stl").geometry(), SceneError, "... mesh: no such file"),
     (lambda at: Mesh(at).geometry(), SceneError, "... mesh: no such file"),
+    (lambda at: Mesh(pipe(at)).geometry(), SceneError, "... a pipe, which may never"),
     (lambda at: Mesh(junk(at)).geometry(), SceneError, "... mesh: cannot read"),
     (lambda at: Mesh(junk(at)).bounding_radius, SceneError, "... junk.stl"),
 ]  # fmt: skip
+
+
+def pipe(at: Path) -> Path:
+    """Return a named pipe, which nobody writes."""
+    os.mkfifo(at / "pipe.stl")
+    return at / "pipe.stl"
 
 
 def junk(folder: Path) -> Path:
