@@ -328,7 +328,8 @@ def _out_of_bounds(finding: Mistake) -> str:
     bound = finding.error["ctx"][symbol]
     low = symbol in ("gt", "ge")
     wrong = "too small" if low else "too large"
-    if low and bound == 0 and finding.value < 0:  # -0.0 is not
+    minus = shown(finding.value).startswith("-") and finding.value != 0  # -0.0 is not
+    if low and bound == 0 and minus:
         wrong = "negative"
     limit = f"{bound:g}" if isinstance(bound, float) else f"{bound}"
     return f"{shown(finding.value)} is {wrong}; must be {words} {limit}"
