@@ -20,7 +20,7 @@ from hsp_control.cli.live_experiment import (
 from hsp_control.cli.loading import read
 from hsp_control.cli.robot_process import RobotProcess
 from hsp_control.cli.true_run import with_tasks
-from hsp_control.common.errors import HspControlError, LiveError, LogError
+from hsp_control.common.errors import LiveError, LogError
 from hsp_control.config import Experiment, load_experiment
 from hsp_control.config.loaded_scenario import load_scenario
 from hsp_control.control.compensation import CompensatedController
@@ -162,7 +162,9 @@ def live(options: argparse.Namespace) -> int:
     out.print(_packets(counts, link.injected, robot_report))
     _print_ends(report, robot_report)
     kept = _convert(loop_log, link=counts, injected=link.injected)
-    kept &= _convert(robot_log, followed=loop_log.with_suffix(".npz"))
+    # Without the loop's log there may be an earlier run's.
+    followed = loop_log.with_suffix(".npz") if kept else None
+    kept &= _convert(robot_log, followed=followed)
     asked = report.ended == "operator" and not requests.fault
     regular = report.ended == "completed" or (asked and duration == inf)
     if not regular:
@@ -274,7 +276,7 @@ def _convert(journal: Path, followed: Path | None = None, **meta: Any) -> bool:
         followed: For the robot's, the log of the loop, which knows what was followed.
         meta: JSON data to add to the log's.
     """
-    unknown: HspControlError | None = None
+    unknown = ""
     try:
         rollout = Rollout.load(journal)
         rollout.meta.update(meta)
@@ -283,16 +285,15 @@ def _convert(journal: Path, followed: Path | None = None, **meta: Any) -> bool:
                 rollout = with_tasks(
                     rollout, Rollout.load(followed), load_experiment(followed)
                 )
-            except HspControlError as error:
-                unknown = error
+            except BaseException as error:  # of the user's own code, or Ctrl-C
+                unknown = described(error)
         log = rollout.save(journal.with_suffix(".npz"))
     except LogError as error:
         print(f"hsp: {error}", file=sys.stderr)
         return False
     journal.unlink(missing_ok=True)
-    if unknown is None:
-        out.print(_summary(rollout))
-    else:
+    out.print(_summary(rollout))
+    if unknown:
         out.print(f"The robot's log has its states only: {unknown}", highlight=False)
     out.print(f"Log: {log}")
     return True

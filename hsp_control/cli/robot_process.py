@@ -273,7 +273,7 @@ class _RobotLog:
         path = Path(settings["log"])
         scene = experiment.scene
         base: Base | None = "flying" if experiment.robot.unactuated else None
-        nothing = Controller(experiment.robot, (), base=base, scene=scene)
+        nothing = Controller(experiment.robot, (), limits=None, base=base, scene=scene)
         self.log = LogWriter(nothing, scene, 0, path=path, meta=meta)
         self.log.warm_up(*self._row(0.0, robot.q, robot.v), parts=False)
 
@@ -300,7 +300,6 @@ class _RobotLog:
 
 def _warm_up(robot: SimulatedRobot, experiment: Experiment) -> None:
     """Execute each real-time operation once in advance."""
-    experiment.controller.compute(0.0, experiment.q0, experiment.v0)
     trial = SimulatedRobot(
         robot.plant,
         robot.q,

@@ -30,16 +30,19 @@ def with_tasks(truth: Rollout, loop: Rollout, repeated: Experiment) -> Rollout:
     controller, state = repeated.controller, RobotState(repeated.robot)
     config = {"config": truth.meta.get("config")}
     writer = LogWriter(controller, repeated.scene, len(truth), meta=config)
+    limits, constant = controller.limits, True
     for t, q, v, tau in zip(truth.t, truth.q, truth.v, truth.tau, strict=True):
         state.update(t, q, v)
         output: ControlOutput | None = None
         with suppress(HspControlError):  # then the columns of the row are empty
             output = controller.compute(state)
+        constant &= controller.limits is limits
         writer.record(state, output, tau, {})
     run = writer.rollout(truth.status, truth.meta["message"])
-    # Excesses are the largest between two rows, which only the robot knows.
     columns = {**truth.columns, **run.columns}
-    columns |= {name: truth[name] for name in (POSITION, VELOCITY)}
+    if limits is not None and constant:
+        # Only the robot knows the largest excess between two rows, over these limits.
+        columns |= {name: truth[name] for name in (POSITION, VELOCITY)}
     # The loop begins the safe stop, and the robot its own when the loop has ended.
     latest = np.searchsorted(loop.t, truth.t, side="right") - 1
     phases = loop["live.phase"][latest.clip(0)]

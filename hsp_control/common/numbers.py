@@ -10,7 +10,7 @@ def check_positive(
     name: str, value: object, unit: str, error: type[HspControlError]
 ) -> float:
     """Return a finite number above zero, or raise an error of the given class."""
-    if not isinstance(value, Real):
+    if not isinstance(value, Real) or isinstance(value, bool):
         of_unit = unit and f" [{unit}]"
         raise error(f"{name} is {value!r}; needs a positive number{of_unit}")
     number = float(value)

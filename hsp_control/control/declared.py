@@ -78,7 +78,7 @@ class DeclaredController:
         self.tasks = tuple(tasks)
         for task in tasks:
             for stream in parts_within(task, Streamed):
-                with within("tasks", task.name, "trajectory", "source"):
+                with within("tasks", task.name):
                     stream.check_recording()
         if metric is None:
             yields = any(impedance_of(task) is not None for task in tasks)

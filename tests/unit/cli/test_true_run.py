@@ -13,6 +13,7 @@ from hsp_control.cli.true_run import with_tasks
 from hsp_control.common.errors import LiveError
 from hsp_control.live import InProcessRobot, Phase
 from hsp_control.live.live_log import live_channels
+from hsp_control.simulation.limit_excess import POSITION, VELOCITY, LimitExcess
 from hsp_control.simulation.log_writer import LogWriter
 
 CONFIG: dict[str, Any] = {
@@ -29,12 +30,14 @@ CONFIG: dict[str, Any] = {
 
 def states_only(run: Rollout, experiment: hsp.Experiment) -> Rollout:
     """Return a log of the same states as a robot writes it: without a controller."""
-    nothing = hsp.Controller(experiment.robot, (), scene=experiment.scene)
+    nothing = hsp.Controller(experiment.robot, (), limits=None, scene=experiment.scene)
+    excess, limits = LimitExcess(experiment.robot), experiment.controller.limits
     writer = LogWriter(nothing, experiment.scene, len(run))
     state = RobotState(experiment.robot)
     for t, q, v, tau in zip(run.t, run.q, run.v, run.tau, strict=True):
-        phase = live_channels(phase=float(Phase.RUNNING))
-        writer.record(state.update(t, q, v), None, tau, phase, parts=False)
+        excess.record(limits, q, v)
+        channels = live_channels(phase=float(Phase.RUNNING)) | excess.collect(limits)
+        writer.record(state.update(t, q, v), None, tau, channels, parts=False)
     return writer.rollout("completed", "", config=run.config)
 
 
@@ -79,6 +82,33 @@ def test_the_tasks_are_those_of_the_loop(tmp_path: Path) -> None:
             )
     np.testing.assert_array_equal(run["live.phase"], loop["live.phase"])
     assert "the safe stop is the last" in str(run)
+
+
+@pytest.mark.parametrize("limits", ["none", {"velocity": 3.0}])
+def test_excesses_are_those_over_the_limits_of_the_time(
+    limits: Any,
+) -> None:
+    """Without limits there are none; the robot knows nothing of changed ones."""
+    changes = [{"type": "limits", "limits": {"velocity": 0.001}, "at": 0.1, "ramp": 0}]
+    circle = {"type": "circle", "origin": "start", "radius": 0.05, "angular_rate": 1.5}
+    circle |= {"center": [0.0, 0.0, 0.05], "normal": [1, 0, 0]}
+    task = {"type": "frame_position", "trajectory": circle, "blend": 0.1}
+    data = CONFIG | {
+        "tasks": {"tip": task},
+        "limits": limits,
+        "changes": changes if limits != "none" else [],
+    }
+    experiment = hsp.load_experiment(data)
+    run = hsp.load_experiment(data).run()
+    columns = {**run.columns, "live.phase": np.ones(len(run))}
+    loop = Rollout(columns, run.meta)
+    truth = states_only(run, experiment)
+    made = with_tasks(truth, loop, experiment)
+    for name in (POSITION, VELOCITY):
+        assert (name in made) == (name in run)
+    if VELOCITY in run:
+        assert truth[VELOCITY].max() == 0.0
+        assert made[VELOCITY][run.t > 0.15].max() > 0.0
 
 
 def test_what_a_plan_made_is_said_to_be_missing() -> None:

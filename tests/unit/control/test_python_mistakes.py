@@ -35,6 +35,7 @@ def still(c: hsp.Controller) -> InProcessRobot:
     (lambda c: hsp.simulate(c, c.robot.home(), duration="1"),
      SimulationError, r"duration is '1'; needs a positive number \[s\]"),
     (lambda c: c.applied(np.zeros(7), "1ms"), ControllerError, "period is '1ms'"),
+    (lambda c: c.applied(np.zeros(7), True), ControllerError, "period is True"),
     (lambda c: c.applied(np.zeros(7), np.nan), ControllerError, "period is nan s"),
     (lambda c: hsp.run_loop(c, still(c), duration="1"), LiveError, "duration is '1'"),
     (lambda c: c.prepare("home"), ControllerError, "state is 'home', a str"),
@@ -51,7 +52,7 @@ def still(c: hsp.Controller) -> InProcessRobot:
      StreamError, "did you mean 'udp://'"),
     (lambda c: hsp.Controller(c.robot, [
         hsp.FramePosition("panda_hand", hsp.Stream(source="nosuch.jsonl"))]),
-     StreamError, r"^tasks.panda_hand.trajectory.source: nosuch.jsonl: .* be read"),
+     StreamError, r"^tasks.panda_hand: nosuch.jsonl: .* be read"),
 ])  # fmt: skip
 def test_it_is_named(mistake: Made, error: type[Exception], message: str) -> None:
     with pytest.raises(error, match=message):
@@ -75,11 +76,9 @@ def test_python_says_which_name_was_meant(
 def test_an_error_inside_a_method_stays_what_it_is() -> None:
     """A TypeError of the body is not taken for one of the call."""
 
-    def field(t: float, q: Any, v: Any) -> Any:
+    def on_row(*_: Any) -> None:
         raise TypeError("mine")
 
-    cost = hsp.FunctionCost(lambda state: field(0.0, 0.0, 0.0))
-    with pytest.raises(Exception, match="mine"):
-        hsp.simulate(
-            controller(field=cost), hsp.Robot.load("panda").home(), duration=0.1
-        )
+    made = controller()
+    with pytest.raises(TypeError, match=r"^mine$"):
+        hsp.simulate(made, made.robot.home(), duration=0.1, on_row=on_row)
