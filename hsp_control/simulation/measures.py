@@ -74,6 +74,11 @@ def effort_unit(rollout: Log) -> str:
     return _EFFORT_UNITS.get(unit) or column_unit(rollout, "tau")
 
 
+def has_law(rollout: Log) -> bool:
+    """Return whether the law is in the log: a robot's own has states only."""
+    return bool(np.isfinite(rollout["null_space_norm"]).any())
+
+
 def rows_compare(rollout: Log) -> bool:
     """Return whether the number of the tasks' rows is constant.
 

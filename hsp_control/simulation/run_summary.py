@@ -15,6 +15,7 @@ from hsp_control.simulation.measures import (
     distances,
     effort_units,
     forces_kept,
+    has_law,
     measure_name,
     measures,
     rate_unit,
@@ -45,7 +46,7 @@ def summary_rows(rollout: Log) -> Iterator[tuple[str, str]]:
         yield "momentum observer", observed
         for row in unexplained_rows(rollout):
             yield "", row
-    if np.isfinite(run["null_space_norm"]).any():
+    if has_law(run):
         yield from _law_rows(run, followed)
     else:  # the log of a robot
         yield "tasks", "not in this log, which has states only"

@@ -299,7 +299,11 @@ def diagnostics_figure(
 def _chosen_panels(runs: Sequence[Rollout], panels: Sequence[str]) -> list[str]:
     """Return the requested panels, or all that can be drawn for all runs."""
     tasks = all(run["singular_values"].size for run in runs)
+    law = all(map(measures.has_law, runs))
     can = {
+        "null_space": law,
+        "decay": law,
+        "field": law,
         "determinant": tasks and all(map(measures.rows_compare, runs)),
         "errors": tasks,
         "singular_values": tasks,

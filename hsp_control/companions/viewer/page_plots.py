@@ -156,6 +156,8 @@ def pack_panels(runs: Sequence[ComparedRun], arrays: ArrayTable) -> Json:
     curves: dict[tuple[str, str], list[_CurveOfRun]] = {}
     for number, run in enumerate(runs):
         for panel in panels_of(run.rollout, run.controller):
+            if not measures.has_law(run.rollout) and _empty(panel):
+                continue
             key = panel.title, panel.unit
             both = dict.fromkeys((*panels.get(key, panel).edges, *panel.edges))
             panels[key] = panels.get(key, panel)._replace(edges=list(both))
@@ -174,6 +176,10 @@ def pack_panels(runs: Sequence[ComparedRun], arrays: ArrayTable) -> Json:
         ],
         "panels": [_packed(panels[key], curves[key], arrays) for key in panels],
     }
+
+
+def _empty(panel: Panel) -> bool:
+    return not any(np.isfinite(each.values).any() for each in panel.series)
 
 
 def _packed(panel: Panel, curves: Sequence[_CurveOfRun], arrays: ArrayTable) -> Json:

@@ -11,6 +11,9 @@ from hsp_control import RobotState, Rollout
 from hsp_control.cli.live_experiment import simulated_robot
 from hsp_control.cli.true_run import with_tasks
 from hsp_control.common.errors import LiveError
+from hsp_control.companions.viewer import ComparedRun, robot_of
+from hsp_control.companions.viewer.packing import ArrayTable
+from hsp_control.companions.viewer.page_plots import pack_panels
 from hsp_control.live import InProcessRobot, Phase
 from hsp_control.live.live_log import live_channels
 from hsp_control.simulation.limit_excess import POSITION, VELOCITY, LimitExcess
@@ -125,5 +128,11 @@ def test_a_log_of_states_is_summed_up_drawn_and_exported(tmp_path: Path) -> None
     log.meta["config"] = experiment.config
     assert "not in this log, which has states only" in str(log)
     assert "nan" not in str(log)
-    hsp.plots.diagnostics_figure(log)
+    figure = hsp.plots.diagnostics_figure(log)
+    titles = "".join(axes.get_title(loc="left") for axes in figure.axes)
+    assert "Efforts" in titles
+    assert "Null-space" not in titles
+    packed = pack_panels([ComparedRun("", robot_of(log), log)], ArrayTable())
+    shown = [each["title"] for each in packed["panels"]]
+    assert shown == ["Joint positions", "Efforts τ"]
     hsp.viewer.export_html(log, tmp_path / "page.html")
