@@ -134,6 +134,7 @@ class Run:
     position: float = np.inf  # [mm]
     angle: float = np.inf  # [°]
     noise: float = np.inf  # efforts' rms change in a period [N·m]
+    wandered: float = np.inf  # the joint farthest from its start, at the end [°]
     rests: bool = False
 
 
@@ -159,7 +160,8 @@ def measured(case: Case, plant: SampledPlant, compute: Compute) -> Run:
     off = np.array(errors)
     value = np.sqrt(np.mean(off**2, axis=0)) if case.moves else off[-1]
     noise = float(np.sqrt(np.mean(np.square(changes))))
-    return Run(float(value[0]), float(value[1]), noise, fastest < AT_REST)
+    wandered = float(np.degrees(np.abs(case.robot.difference(case.q0, q)).max()))
+    return Run(float(value[0]), float(value[1]), noise, wandered, fastest < AT_REST)
 
 
 def laws(
@@ -274,6 +276,7 @@ def row(arm: str, name: str, held: list[Run], circled: list[Run]) -> str:
     cells = [
         pair([each.position for each in held]),
         pair([each.angle for each in held]),
+        pair([each.wandered for each in held]),
         pair([each.position for each in circled]),
         pair([each.angle for each in circled]),
         _number(float(np.median([each.noise for each in held]))),
@@ -290,8 +293,9 @@ BORNE = """\
 With which a pose settles on the model itself, whose wrist has no rotors: a damping of
 10 N·m·s/rad on 0.007 kg m² tolerates less than a period."""
 HEADER = (
-    "| arm | law | held: hand [mm] | angle [°] | circle: hand [mm] | angle [°] "
-    "| effort's change [N·m] | rests |\n|---|---|--:|--:|--:|--:|--:|--:|"
+    "| arm | law | held: hand [mm] | angle [°] | joint [°] | circle: hand [mm] "
+    "| angle [°] | effort's change [N·m] | rests |\n"
+    "|---|---|--:|--:|--:|--:|--:|--:|--:|"
 )
 INTRODUCTION = """\
 # Arms that are not their models
@@ -300,8 +304,9 @@ Written by `.venv/bin/python benchmarks/real_arm.py{alone}`; do not edit.
 
 A pose is held for 3 s, or the hand moves on a circle of 8 cm at 2 rad/s, at 1 kHz. No
 law knows the differences. Median / worst of {seeds} seeds: the pose's error at the end,
-and rms on the circle in its last second; the rms change of an effort in a period; how
-many rest, with no joint faster than 0.05 rad/s in the last second. – diverges.
+and of the joint that is farthest from its start; rms on the circle in its last second;
+the rms change of an effort in a period; how many rest, with no joint faster than
+0.05 rad/s in the last second. – diverges.
 
 Gains are those of each project: crisp_py's for a Franka, Isaac-Reach-Franka-OSC,
 robosuite's `osc_pose.json`, pink's example with Kp = 100 and Kv = 20 in joint space.
