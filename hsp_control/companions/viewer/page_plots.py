@@ -4,6 +4,7 @@ from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.companions.plots import log_series, palette
@@ -156,8 +157,8 @@ def pack_panels(runs: Sequence[ComparedRun], arrays: ArrayTable) -> Json:
     curves: dict[tuple[str, str], list[_CurveOfRun]] = {}
     for number, run in enumerate(runs):
         for panel in panels_of(run.rollout, run.controller):
-            if not measures.has_law(run.rollout) and _empty(panel):
-                continue
+            if not any(np.isfinite(each.values).any() for each in panel.series):
+                continue  # of a law in a log of states, of a task that never begins
             key = panel.title, panel.unit
             both = dict.fromkeys((*panels.get(key, panel).edges, *panel.edges))
             panels[key] = panels.get(key, panel)._replace(edges=list(both))
@@ -178,10 +179,6 @@ def pack_panels(runs: Sequence[ComparedRun], arrays: ArrayTable) -> Json:
     }
 
 
-def _empty(panel: Panel) -> bool:
-    return not any(np.isfinite(each.values).any() for each in panel.series)
-
-
 def _packed(panel: Panel, curves: Sequence[_CurveOfRun], arrays: ArrayTable) -> Json:
     measured = [c.series.values for c in curves if not c.series.predicted]
     low, high = _range(panel, np.concatenate(measured))
@@ -190,22 +187,32 @@ def _packed(panel: Panel, curves: Sequence[_CurveOfRun], arrays: ArrayTable) -> 
     step = bound / 8.0
     packed = []
     for run, times, series in curves:
-        shown = np.asarray(series.values, float)
+        missing = np.isnan(series.values)
+        shown = _filled(np.asarray(series.values, float), missing)
         if panel.logarithmic:
-            with np.errstate(divide="ignore", invalid="ignore"):
-                shown = np.log10(shown)
+            with np.errstate(divide="ignore"):
+                shown = np.log10(shown.clip(0.0))
         # All values outside the axis are clipped to one height beyond its end.
-        shown = np.nan_to_num(shown, nan=low - span).clip(low - span, high + span)
+        shown = shown.clip(low - span, high + span)
         rounded = step * np.rint(shown / step)
         keys = keyframe_rows(times, shown, rounded, bound)
         numbers = {
             "times": arrays.numbers(times[keys], CLOCK_STEP, np.float64),
             "values": arrays.numbers(rounded[keys], step),
+            "gaps": log_series.spans_of(times, missing),
         }
         packed.append({**series._asdict(), "run": run, **numbers})
     edges = [edge._asdict() for edge in panel.edges]
     about = {"edges": edges, "low": low, "high": high, "series": packed}
     return {**panel._asdict(), **about}
+
+
+def _filled(values: Array, missing: NDArray[np.bool_]) -> Array:
+    """Return values that stay where there are none: a gap costs no keyframes."""
+    filled, known = values.copy(), np.flatnonzero(~missing)
+    gaps = np.flatnonzero(missing)
+    filled[gaps] = np.interp(gaps, known, values[known]) if known.size else 1.0
+    return filled
 
 
 def _range(panel: Panel, values: Array) -> tuple[float, float]:

@@ -336,10 +336,12 @@ class RunPlot extends Plot {
   }
 }
 
-// A curve's value at a time; null after its end or before its start.
+// A curve's value at a time; null before its start, in its gaps and after its end.
 function valueAt(curve, time) {
-  const {times, values} = curve;
-  if (time < times[0] - 1e-6 || time > times.at(-1) + 1e-6) return null;
+  const {times, values, gaps} = curve, end = times.at(-1) + 1e-6;
+  if (time < times[0] - 1e-6 || time > end) return null;
+  // A gap ends where the next value is; the last one, with the run.
+  if (gaps.some(([from, to]) => time >= from && (time < to || to > end - 2e-6))) return null;
   curve.line ??= new MeshCat.THREE.LinearInterpolant(times, values, 1);
   return curve.line.evaluate(time)[0];
 }

@@ -472,6 +472,25 @@ def test_where_the_law_is_bounded_the_plots_are_marked(planar: Rollout) -> None:
     assert packed["damped"] == [expected]
 
 
+def test_where_a_curve_has_no_numbers_it_has_a_gap(planar: Rollout) -> None:
+    t, none = planar.t, np.full(len(planar), np.nan)
+    error = planar["task.tip.error"].copy()
+    error[:3] = error[10:12] = error[-2:] = np.nan
+    columns = {"task.tip.error": error, "manipulability": none}
+    table = ArrayTable()
+    changed = Rollout(planar.columns | columns, planar.meta)
+    packed = pack_panels([logged(changed)], table)
+    panels = {panel["title"]: panel for panel in packed["panels"]}
+    assert "Determinant" not in panels
+    (curve,) = panels["Task error ‖e‖"]["series"]
+    assert curve["gaps"] == [(t[0], t[3]), (t[10], t[12]), (t[-2], t[-1])]
+    (whole,) = panels["Value of the field"]["series"]
+    assert whole["gaps"] == []
+    # What is drawn beside a gap does not fall to the end of the axis.
+    values = unpacked(table.entries[curve["values"]["$array"]])
+    assert values.min() >= panels["Task error ‖e‖"]["low"]
+
+
 @pytest.mark.parametrize("values", [[np.nan] * 4, [0.0] * 4, [1.0, np.inf, 0.5, -1.0]])
 def test_undrawable_parts_do_not_break_the_page(
     values: list[float], planar: Rollout

@@ -168,6 +168,19 @@ def test_all_plots_zoom_together_and_back(page: Any) -> None:
 
 
 @pytest.mark.browser
+def test_in_a_gap_a_curve_has_no_value(page: Any) -> None:
+    script = """(moments) => {
+      const times = new Float64Array([0, 1, 2, 3]);
+      const values = new Float32Array([0, 10, 20, 30]);
+      const curve = {times, values, gaps: [[0.5, 1.5], [2.5, 3]]};
+      return moments.map((time) => valueAt(curve, time));
+    }"""
+    moments = [-1, 0, 0.49, 0.5, 1.49, 1.5, 2.4, 2.5, 3, 4]
+    expected = [None, 0, 4.9, None, None, 15, 24, None, None, None]
+    assert page.evaluate(script, moments) == pytest.approx(expected, abs=1e-5)
+
+
+@pytest.mark.browser
 def test_a_plot_is_used_with_the_keyboard(page: Any) -> None:
     picture = page.locator("#side figure").first
     picture.focus()
