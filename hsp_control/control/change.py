@@ -397,7 +397,8 @@ class MoveObstacle(Change, type="obstacle"):
         with within("obstacle"):
             old = setup.start.scene[self.obstacle]
         here = old.center.sample(max(self.at, start.state.t)).position
-        return replace(self, center=self.center.anchored(here))
+        with within("center"):
+            return replace(self, center=self.center.anchored(here))
 
     def apply(self, setup: Setup) -> Setup:
         """Return the setup with the obstacle at all its uses; see `Change.apply`."""

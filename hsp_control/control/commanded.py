@@ -10,13 +10,20 @@ import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from hsp_control.common.errors import ControllerError
+from hsp_control.common.warned import warn
 from hsp_control.control.changes import Change, Changes
 from hsp_control.control.composition import Composition
 from hsp_control.control.declared_rates import check_rates
 from hsp_control.control.first_state import warn_of_far_target
 from hsp_control.control.gains_in_force import check_held
 from hsp_control.control.stream_handle import StreamHandle
-from hsp_control.control.targets import RAMP, followed_stream, new_stream, target_of
+from hsp_control.control.targets import (
+    RAMP,
+    followed_stream,
+    listened_to,
+    new_stream,
+    target_of,
+)
 from hsp_control.tasks import Task
 from hsp_control.trajectories.crossfade import settled
 from hsp_control.trajectories.streams.followed import FollowedStream
@@ -48,7 +55,8 @@ class Commanded(Composition):
         ``controller.set_target("hand", pose)``, at any time and as often as needed. A
         stream takes over from the task's trajectory, with a crossfade, and goes there
         as fast as it may: at 0.5 m/s and 3 m/s², 1.5 rad/s and 8 rad/s². A task that
-        was given a stream, with its own bounds, continues with that.
+        was given a stream, with its own bounds, continues with that, unless it listens
+        to a source: then this one takes over, and says so.
         ``controller.at(t).reference(task, trajectory)`` ends it.
 
         Args:
@@ -157,6 +165,12 @@ class Commanded(Composition):
         """Send a message to a task's stream, which takes over if there is none yet."""
         present = self._followed(task)
         if followed_stream(present) is None:
+            if source := listened_to(present):
+                warn(
+                    f"task {task!r} follows {source} no longer: a command takes over; "
+                    f"controller.at(t).reference({task!r}, stream) returns to it",
+                    UserWarning,
+                )
             reference: Any = new_stream(present.followed)
             reference.check(getattr(present.followed, "dimension", None), **message)
             self.at(self._state.t).ramp(RAMP).reference(task, reference)

@@ -76,10 +76,6 @@ class DeclaredController:
         self.field = Rest() if field is None else field
         check_parts("tasks", tasks, Task)
         self.tasks = tuple(tasks)
-        for task in tasks:
-            for stream in parts_within(task, Streamed):
-                with within("tasks", task.name):
-                    stream.check_recording()
         if metric is None:
             yields = any(impedance_of(task) is not None for task in tasks)
             own = MassMatrixMetric(inertia="robot")

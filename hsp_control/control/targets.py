@@ -60,10 +60,19 @@ def followed_stream(task: Task) -> StreamRun | None:
 
     One that reads a source or a recording cannot be sent to.
     """
+    run = _run_of(task)
+    return None if run is None or run.stream.listens_to else run
+
+
+def listened_to(task: Task) -> str:
+    """Return the source of the stream that a task follows; empty: none."""
+    run = _run_of(task)
+    return "" if run is None else run.stream.listens_to
+
+
+def _run_of(task: Task) -> StreamRun | None:
     followed: object = settled(task.followed, np.inf)
-    if isinstance(followed, FollowedStream) and not followed.run.stream.listens_to:
-        return followed.run
-    return None
+    return followed.run if isinstance(followed, FollowedStream) else None
 
 
 def target_of(task: Task, value: object, here: Callable[[], RobotState]) -> Array:

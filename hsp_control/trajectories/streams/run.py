@@ -48,6 +48,8 @@ class StreamRun:
         self._period_alone: float | None = None  # of a run without Python
         self._reader: Reader | None = None
         self._planner: Planner | None = None
+        if stream.listens_to and not stream.live:
+            self._reader = self._opened()  # a bad recording stops no moving robot
 
     # -- messages ---------------------------------------------------------------------
 

@@ -106,11 +106,6 @@ class Streamed(Part, error=TrajectoryError):
         """The source of its messages, instead of `send`; empty: none."""
         return self.source or ("a recording" if self.messages is not None else "")
 
-    def check_recording(self) -> None:
-        """Raise if it names a recording that cannot be read: a run would not begin."""
-        if self.source is not None and not self.live:
-            recorded(read_recording(Path(self.source)), Space(None, False))
-
     def recorded_in(self, folder: Path, allow: Callable[[Path], object]) -> Self:
         """Return the stream with the messages of its recording, if it names one."""
         if self.source is None or self.live:

@@ -1,5 +1,6 @@
 """What is mistyped in Python is named: arguments, numbers, and names of modules."""
 
+import warnings
 from collections.abc import Callable
 from typing import Any
 
@@ -52,7 +53,13 @@ def still(c: hsp.Controller) -> InProcessRobot:
      StreamError, "did you mean 'udp://'"),
     (lambda c: hsp.Controller(c.robot, [
         hsp.FramePosition("panda_hand", hsp.Stream(source="nosuch.jsonl"))]),
-     StreamError, r"^tasks.panda_hand: nosuch.jsonl: .* be read"),
+     StreamError, r"^tasks.panda_hand.trajectory: nosuch.jsonl: .* be read"),
+    (lambda c: controller(scene=[hsp.Obstacle("o", hsp.Sphere(0.1), [1, 1, 1])]).at(
+        1.0).obstacle("o", hsp.Stream(messages=[{"at": 0, "value": [1, 2]}])),
+     StreamError, r"^center: message 0 of the recording: value has 2 .* needs 3"),
+    (lambda c: c.at(1).reference(
+        "panda_hand", hsp.Stream(messages=[{"at": 0, "value": [1, 2]}])),
+     StreamError, r"^trajectory: message 0 of the recording: value has 2 .* needs 3"),
 ])  # fmt: skip
 def test_it_is_named(mistake: Made, error: type[Exception], message: str) -> None:
     with pytest.raises(error, match=message):
@@ -82,3 +89,15 @@ def test_an_error_inside_a_method_stays_what_it_is() -> None:
     made = controller()
     with pytest.raises(TypeError, match=r"^mine$"):
         hsp.simulate(made, made.robot.home(), duration=0.1, on_row=on_row)
+
+
+def test_a_command_that_ends_a_source_says_so() -> None:
+    listening = hsp.Stream(messages=[{"at": 0.0, "value": [0.3, 0.0, 0.6]}])
+    robot = hsp.Robot.load("panda")
+    made = hsp.Controller(robot, [hsp.FramePosition("panda_hand", listening)])
+    made.compute(0.0, robot.home(), np.zeros(7))
+    with pytest.warns(UserWarning, match=r"'panda_hand' follows a recording no longer"):
+        made.set_target("panda_hand", [0.4, 0.0, 0.5])
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")  # it is said once: this stream is sent to
+        made.set_target("panda_hand", [0.4, 0.0, 0.6])

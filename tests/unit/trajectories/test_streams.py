@@ -3,7 +3,9 @@
 import copy
 import json
 import pickle
+import re
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -568,9 +570,12 @@ def test_a_declaration_moves_nothing_and_names_the_run(kind: Any) -> None:
     assert hash(kind()) == hash(kind())
 
 
-def test_a_stream_with_an_address_cannot_be_sent_to() -> None:
-    with pytest.raises(StreamError, match=r"receives from goals\.jsonl"):
-        Stream([0.0], source="goals.jsonl").anchored(None).run.send([0.0])
+def test_a_stream_with_a_source_cannot_be_sent_to(tmp_path: Path) -> None:
+    file = tmp_path / "goals.jsonl"
+    file.write_text('{"at": 0, "value": [0]}\n')
+    for source in (str(file), "udp://127.0.0.1:5005"):
+        with pytest.raises(StreamError, match=f"receives from {re.escape(source)}"):
+            Stream([0.0], source=source).anchored(None).run.send([0.0])
 
 
 @pytest.mark.parametrize(("text", "message"), [
