@@ -126,7 +126,6 @@ class Controller(Commanded):
         # nothing of a step, and the next one would cost many times as much.
         memory, now, state = self._memory, self._in_force, self._state
         origin, q, v = memory.origin.item(), state.q.copy(), state.v.copy()
-        active, damped = now.mixture.active, now.mixture.damped
         # An error here is also raised in a step, if its cause exists by then.
         with memory.kept(), suppress(Exception):
             for _ in range(times):
@@ -142,7 +141,6 @@ class Controller(Commanded):
         now.limits.update()  # from the last effort
         now.gains.write_all(state.t)
         bytes(_LARGE)
-        now.mixture.active, now.mixture.damped = active, damped
 
     def _observe(
         self,
