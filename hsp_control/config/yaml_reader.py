@@ -231,7 +231,10 @@ def _value(node: yaml.Node, path: KeyPath) -> Any:
     line = _mark(node).line
     if node.tag not in _SCALARS or not isinstance(node, yaml.ScalarNode):
         tag = node.tag.replace(TAG, "!!")
-        raise YamlError(line, f"the tag {tag!r} is not allowed: plain data only", path)
+        message = f"the tag {tag!r} is not allowed: plain data only"
+        if isinstance(node, yaml.MappingNode) and not tag.startswith("!!"):
+            message += f"; did you mean {{type: {tag[1:]}, ...}}?"
+        raise YamlError(line, message, path)
     name, convert, _ = _SCALARS[node.tag]
     try:
         return convert(node.value)

@@ -6,7 +6,7 @@ from contextlib import contextmanager
 from typing import TypeAlias
 
 from hsp_control.common.errors import ConfigError, HspControlError
-from hsp_control.declaration.language import shortened
+from hsp_control.declaration.language import shortened, spoken
 
 KeyPath: TypeAlias = tuple[str | int, ...]
 
@@ -80,8 +80,27 @@ def located(where: str, message: str, path: KeyPath = ()) -> ConfigError:
     return error
 
 
+_ARGUMENTS: dict[KeyPath, str] = {
+    ("null_space", "gain"): "null_space_gain",
+    ("null_space", "metric"): "metric",
+    ("null_space", "fields"): "field",
+}
+"""The arguments of a controller in Python, by their keys in a configuration."""
+
+
+def place_of(path: KeyPath) -> str:
+    """Return a place in the user's language: keys, or in Python arguments."""
+    argument = _ARGUMENTS.get(path[:2])
+    in_python = path if argument is None else (argument, *path[2:])
+    return spoken(written(path), written(in_python))
+
+
 def _rewrite(error: HspControlError, path: KeyPath, where: str | None) -> None:
     bare = error.bare_message
     error.path, error.location = path, where
-    whole = ": ".join(part for part in (where, written(path), bare) if part)
+    # A configuration in Python, a dictionary, has keys, too.
+    place = place_of(path) if where is None else written(path)
+    if where is None and bare.startswith((f"{place} is ", f"{place} has ")):
+        place = ""  # which the message names already
+    whole = ": ".join(part for part in (where, place, bare) if part)
     error.args = (whole, *error.args[1:])

@@ -219,7 +219,8 @@ def explained(finding: Mistake, key: str = "key") -> str:
         case "mismatch" if words := joined(_words(expected)):
             return _mismatch(value, words, expected)
         case "extra_forbidden":
-            return f"unknown {key} {_unknown(value, keys(expected))}"
+            holder = _holder(value, expected)
+            return f"unknown {key} {_unknown(value, keys(expected), holder)}"
         case "missing":
             return _missing(key, value, keys(expected, required=True))
         case "union_tag_invalid" if tag := expected.discriminator:
@@ -247,9 +248,21 @@ def explained(finding: Mistake, key: str = "key") -> str:
     return _message_of_pydantic(finding)
 
 
-def _unknown(value: Any, options: Iterable[Any]) -> str:
+def _holder(value: Any, expected: ValueTypes) -> str:
+    """Return where an unknown key would be right, if that is one level deeper."""
+    inside = [
+        key
+        for key in keys(expected)
+        for option in expected.options
+        if (inner := entry(option, key)) and value in keys(inner)
+    ]
+    names = [*dict.fromkeys(map(repr, inside))]
+    return f"; it belongs to {joined(names)}" if 0 < len(names) < 3 else ""
+
+
+def _unknown(value: Any, options: Iterable[Any], holder: str = "") -> str:
     allowed = [str(option) for option in options]
-    near = _near(value, allowed)
+    near = holder or _near(value, allowed)
     among = f" (allowed: {listing(allowed, _LONG_LIST)})" if allowed else ""
     return f"{shown(value)}{near}{among}"
 

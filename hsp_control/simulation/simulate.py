@@ -30,6 +30,7 @@ from hsp_control.control.first_state import (
 from hsp_control.control.plans import MotionPlan, RunningPlan
 from hsp_control.declaration import Part, within
 from hsp_control.declaration.language import check_kind
+from hsp_control.declaration.located import place_of
 from hsp_control.declaration.quantities import Flag, Number, Positive
 from hsp_control.geometry.scene import Scene
 from hsp_control.robot.integrators import Dop853, Integrator, Rk4
@@ -195,7 +196,7 @@ def simulate(
                 plant=plant.robot,
             )
             for each in high:
-                warning = f"{'.'.join(each.path)}: {each.message}"
+                warning = f"{place_of(each.path)}: {each.message}"
                 warn(warning, StartWarning)
         chain = ControlChain(
             CompensatedController(controller, compensation), plan, estimators

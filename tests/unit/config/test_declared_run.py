@@ -101,7 +101,7 @@ def test_a_live_loop_repeats_as_a_simulation_until_its_stop(tmp_path: Path) -> N
 
 @pytest.mark.parametrize(("made", "given", "why"), [
     ({"field": hsp.FunctionCost(lambda state: state.q[0] ** 2)}, {},
-     r"null_space\.fields\.0\.function: YAML cannot express <lambda>: it is Python"),
+     r"field\.0\.function: YAML cannot express <lambda>: it is Python"),
     ({}, {"plant": hsp.plants.RigidBodyPlant(heavier())},
      "its plant is a RigidBodyPlant that was built in Python; give a PlantPart"),
 ])  # fmt: skip

@@ -82,6 +82,7 @@ UNREADABLE = [
     ("a:\n- !!python/object/apply:os.system ['false']",
      "2: a.0: ... '!!python/object/apply:os.system' is not allowed"),
     ("a: !gain 3", "1: a: ... '!gain' is not allowed"),
+    ("a: !circle {radius: 1}", "1: a: ... '!circle' ... {type: circle, ...}"),
     ("a: !!bool on", "1: a: 'on' ... true or false"),
     ("a: 18446744073709551616", "1: a: '18446744073709551616' ... 64-bit"),
     ('a: "\\ud800"', r"1: a: '\ud800' ... text"),

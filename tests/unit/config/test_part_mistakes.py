@@ -89,6 +89,11 @@ MISTAKES: list[tuple[dict[str, Any], str, str]] = [
      "scene.obstacles.'': ... at least 1"),
     ({"tasks": {"ha:nd": {"type": "frame_position"}}}, "TaskError",
      "tasks.'ha:nd': ... letters, digits, '_' and '-'"),
+    # where they belong
+    ({"obstacles": {"a": {"shape": BOX, "center": HOLD}}}, "ConfigError",
+     "obstacles: unknown ... belongs to 'scene'"),
+    ({"duration": 3}, "ConfigError", "duration: unknown ... belongs to 'simulation'"),
+    (task(kp=100), "ConfigError", "tasks.hand.kp: unknown ... belongs to 'gains'"),
     # values
     (task(gains={"kp": [1, [2]], "kv": 1}), "ConfigError",
      "tasks.hand.gains.kp.1: [2] ... a number"),

@@ -138,7 +138,7 @@ def test_an_unrepeatable_run_gives_the_reason_and_an_error_ends_the_log(
         _ = 1 / 0
     assert recorder.rollout.status == "stopped"
     assert recorder.rollout.meta["message"] == "ZeroDivisionError: division by zero"
-    with pytest.raises(ConfigError, match="configuration: null_space"):
+    with pytest.raises(ConfigError, match=r"configuration: field\.0"):
         hsp.load_experiment(path)
     empty = hsp.Recorder(controller)
     with pytest.raises(LogError, match="nothing was recorded"):

@@ -81,7 +81,7 @@ TOGETHER = {"null_space_gain": indefinite_gain(), "metric": ConstantMetric(W1)}
         (
             {"field": hsp.Rest() + hsp.TargetPosture([0.0, 1.0])},
             ShapeError,
-            "null_space.fields.1.target: ... (2,) ... 7 numbers",
+            "field.1.target: ... (2,) ... 7 numbers",
         ),
         (
             {"tasks": named("one", "two", "three")},
@@ -118,7 +118,7 @@ TOGETHER = {"null_space_gain": indefinite_gain(), "metric": ConstantMetric(W1)}
         (
             {"field": hsp.ObstacleClearance(["ball"])},
             SceneError,
-            "null_space.fields.0.obstacles.0: no obstacle 'ball'",
+            "field.0.obstacles.0: no obstacle 'ball'",
         ),
         ({"start": [0.0, 1.0]}, ShapeError, "... panda needs (7,)"),
         ({"base": "flying"}, ContactError, "base: panda has no free-flyer"),
@@ -131,7 +131,7 @@ TOGETHER = {"null_space_gain": indefinite_gain(), "metric": ConstantMetric(W1)}
         (
             {"null_space_gain": "fast"},
             GainError,
-            "null_space.gain: ... 'fast' ... numbers",
+            "null_space_gain ... 'fast' ... numbers",
         ),
         ({"null_space_gain": np.nan}, GainError, "... is nan ... finite"),
         (
@@ -140,7 +140,7 @@ TOGETHER = {"null_space_gain": indefinite_gain(), "metric": ConstantMetric(W1)}
             "... null_space_gain ... (2,) ... 7 × 7",
         ),
         (TOGETHER, GainError, "... eigenvalue of W K_N is -"),
-        ({"metric": SHORT}, MetricError, "null_space.metric.matrix: ... (3, 3)"),
+        ({"metric": SHORT}, MetricError, "metric.matrix: ... (3, 3)"),
         ({"singularity_threshold": 0.0}, ControllerError, "... is 0.0 ... positive"),
         ({"singularity_threshold": np.nan}, ControllerError, "... is nan ... positive"),
     ],

@@ -175,12 +175,12 @@ WAYS: dict[str, tuple[Callable[[Any], Any], Callable[..., Array], str]] = {
     "FunctionField": (
         lambda rate: FunctionField(g, rate_function=rate, name="mine"),
         g_rate,
-        "null_space.fields.0: field 'mine': rate_function is wrong: g' = ",
+        "field.0: field 'mine': rate_function is wrong: g' = ",
     ),
     "FunctionCost": (
         lambda rate: hsp.FunctionCost(f, rate_function=rate, name="mine"),
         slope_rate,
-        "null_space.fields.0: cost 'mine': rate_function is wrong: (∇f)' = ",
+        "field.0: cost 'mine': rate_function is wrong: (∇f)' = ",
     ),
     "FunctionCost with its gradient": (
         lambda rate: hsp.FunctionCost(f, gradient_function=slope, rate_function=rate),
@@ -206,7 +206,7 @@ WAYS: dict[str, tuple[Callable[[Any], Any], Callable[..., Array], str]] = {
     "in a sum": (
         lambda rate: hsp.JointCentering() + 3.0 * FunctionField(g, rate_function=rate),
         g_rate,
-        "null_space.fields.1: field 'function_field': rate_function is wrong: g' = ",
+        "field.1: field 'function_field': rate_function is wrong: g' = ",
     ),
 }
 
@@ -277,7 +277,7 @@ def test_a_wrong_weight_is_named() -> None:
 
 def test_a_wrong_metric_is_named() -> None:
     first_step(hsp.JointCentering(), metric=Lengthened(1.0))
-    words = r"null_space.metric: .* Lengthened.evaluate is wrong: W' = .* \(\d, \d\)"
+    words = r"metric: .* Lengthened.evaluate is wrong: W' = .* \(\d, \d\)"
     with pytest.raises(RateError, match=words):
         first_step(hsp.JointCentering(), metric=Lengthened(-1.0))
 

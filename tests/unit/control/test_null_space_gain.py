@@ -124,9 +124,7 @@ def damping(nv: int, rng: np.random.Generator) -> Array:
     return np.asarray(5.0 * np.eye(nv) + root @ root.T)
 
 
-REFUSED = wording(
-    "... null_space_gain is no multiple ... MassMatrixMetric ... one number ... 2.5"
-)
+REFUSED = "null_space_gain is no multiple ... MassMatrixMetric ... one number ... 2.5"
 
 
 def holding(gain: Any, metric: hsp.metrics.Metric) -> Controller:
@@ -144,10 +142,10 @@ def test_a_matrix_over_the_mass_matrix_is_refused(gain: Any) -> None:
     mass = hsp.metrics.MassMatrixMetric()
     if np.ndim(gain) == 2 and gain[0, 1]:
         gain = gain - 1.0  # off the diagonal, too
-    with pytest.raises(GainError, match="^null_space.gain: " + REFUSED):
+    with pytest.raises(GainError, match=wording(REFUSED)):
         holding(gain, mass)
     controller = holding(7 * [4.0], mass)
-    with pytest.raises(GainError, match="^gain: " + REFUSED):
+    with pytest.raises(GainError, match=wording("gain: ... " + REFUSED)):
         controller.at(1.0).null_space_gain(gain)
     np.testing.assert_array_equal(controller.null_space_gain, 4.0 * np.eye(7))
     controller.at(1.0).null_space_gain(6.0)

@@ -444,7 +444,7 @@ def test_the_command_line_suggests_close_names(
         (
             {"gain": 5000.0},
             0,
-            r"^null_space\.gain: unstable at this rate: .* most 200 ",
+            r"^null_space_gain: unstable at this rate: .* most 200 ",
         ),
         (
             {"frequency": 500.0},

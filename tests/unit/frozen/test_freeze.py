@@ -116,7 +116,7 @@ def test_a_function_of_python_is_refused_with_its_key(tmp_path: Path) -> None:
     hand = hsp.FramePosition("panda_tcp")
     field = hsp.JointCentering() + hsp.FunctionCost(height)
     controller = hsp.Controller(robot, [hand], field, start=robot.home())
-    with pytest.raises(FreezeError, match=r"^null_space\.fields\.1: .* is Python"):
+    with pytest.raises(FreezeError, match=r"^field\.1: .* is Python"):
         hsp.freeze(controller, tmp_path / "frozen.hsp")
     path = hsp.trajectories.CallableTrajectory(lambda t: np.array([0.5, 0.0, 0.5]), 3)
     led = hsp.FramePosition("panda_tcp", path, name="led")

@@ -141,7 +141,7 @@ MISTAKES: list[tuple[type, dict[str, Any], type[HspControlError], str]] = [
     (Manipulability, {"metric": np.ones((7, 7))}, FieldError,
      "Manipulability: metric ... positive definite"),
     (Manipulability, {"metric": np.eye(6)}, FieldError,
-     "metric: metric ... (6, 6) ... (7, 7)"),
+     "metric ... (6, 6) ... (7, 7)"),
     (Manipulability, {"frame": "panda_link2"}, FieldError,
      "... 3 rows ... 'panda_link2' ... 2 degrees"),
     (InverseCondition, {"frame": "panda_link5", "rows": "pose"}, FieldError,
