@@ -7,6 +7,7 @@ from loaded_robots import panda
 
 from hsp_control.common.arrays import Array, Flags
 from hsp_control.live import LiveSettings, Measurement
+from hsp_control.live.expected_motion import ExpectedMotion
 from hsp_control.live.reaction_check import ReactionCheck
 from hsp_control.live.trusted_motion import TrustedMotion
 from hsp_control.live.velocity_check import VelocityCheck
@@ -125,6 +126,25 @@ def test_a_source_that_is_trusted_again_is_expected_where_it_is() -> None:
     for _ in range(30):  # a clear case: velocities are wrong
         motion.update(1.0, -1.0, first=3.0)
     assert trusted.trusted_positions.all()
+
+
+def test_a_joint_is_expected_by_the_source_that_is_still_trusted() -> None:
+    """As before the last step, which the wrong source may have made; or as neither."""
+    expected = ExpectedMotion(panda(), 0.3, PERIOD, panda().dynamics())
+    expected.begin(np.zeros(7))
+    trusted = np.ones((2, 7), dtype=bool)
+    for _ in range(2):  # measured velocities and slopes differ
+        expected.follow(
+            np.stack([np.full(7, 0.2), np.full(7, -0.2)]), trusted, PERIOD, braked=False
+        )
+    by_v, by_q, mean = expected.before.copy()
+    assert (by_v > 0.0).all()
+    assert (by_q < 0.0).all()
+    kept = expected.v[2, 3:].copy()
+    trusted[:, :3] = [[True, False, False], [False, True, False]]
+    expected.leave(~trusted.all(axis=0), trusted)
+    np.testing.assert_array_equal(expected.v[2, :3], [by_v[0], by_q[1], mean[2]])
+    np.testing.assert_array_equal(expected.v[2, 3:], kept)
 
 
 @pytest.mark.parametrize("period", [0.001, 0.005, 0.01])
