@@ -298,3 +298,13 @@ def test_a_matrix_gain_predicts_a_band_and_the_log_lies_in_it(
     untold = changed(run, metric_matrix=None)
     (unknown, *_) = legend_texts(drawn(plots.draw_null_space_error, untold))[::-1]
     assert unknown == "no prediction: $K_N$ is a matrix, $W$ not in the log"
+
+
+def test_of_many_curves_those_that_vary_most_have_a_name() -> None:
+    """Seven of more than fourteen, in their order."""
+    spreads = np.random.default_rng(1).permutation(15).astype(float)
+    values = 100.0 - np.outer([0.0, 1.0, 0.5], spreads)
+    found = log_series.lively(values)
+    assert found == np.flatnonzero(spreads >= 8.0).tolist()
+    assert len(found) == log_series.SELECTED
+    assert log_series.lively(values[:, :14]) == [*range(14)]
