@@ -161,6 +161,24 @@ def test_noise_of_a_velocity_is_no_motion(period: float) -> None:
     np.testing.assert_allclose(motion.trusted.mean_velocity, 0.2 * np.eye(7)[6])
 
 
+@pytest.mark.parametrize("stops", [False, True])
+def test_in_a_stop_a_known_load_may_hold_a_joint(stops: bool) -> None:
+    """Before, it may be a dead sensor: the joint should move, but stays to the bit."""
+    trusted, q, rest = TrustedMotion(panda(), SETTINGS, PERIOD), start(), np.zeros(7)
+    load = np.array([0.0, 25.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+    if stops:
+        trusted.stop()
+    faults = []
+    for k in range(1, 200):
+        passed = PERIOD if k > 1 else 0.0
+        trusted.update(Measurement(k, k * PERIOD, q, rest), passed, rest > 0.0)
+        trusted.applied(q, rest, gravity(q) - load, load)
+        faults.append(trusted.fault)
+    found = [each for each in faults if each is not None]
+    assert bool(found) != stops, found
+    assert all("panda_joint2 stays the same to the last bit" in each for each in found)
+
+
 def test_one_noisy_velocity_of_a_braked_joint_is_no_acceleration() -> None:
     motion = Motion(0.002)
     for _ in range(50):
