@@ -247,6 +247,17 @@ def test_field_gains_and_tasks_change_without_a_jump(tmp_path: Path) -> None:
     assert list(run.meta["tasks"]) == ["tip", "elbow"]  # a removed one is drawn, too
 
 
+def test_requested_changes_are_made_in_their_order() -> None:
+    """Also one that is requested by a change, and none twice."""
+    requests, made = OperatorRequests(), list[int]()
+    for k in range(3):
+        requests.call(lambda k=k: made.append(k))
+    requests.call(lambda: requests.call(lambda: made.append(3)))
+    requests.run_pending()
+    requests.run_pending()
+    assert made == [0, 1, 2, 3]
+
+
 def test_a_task_of_another_form_is_logged_by_another_name() -> None:
     controller = law()
     elbow = FramePosition("panda_link4", Hold([0.6]), name="elbow", axes="z")
