@@ -20,7 +20,7 @@ from hsp_control.companions.play.other_law import PLAIN, OtherLaw
 from hsp_control.companions.play.plain_impedance import PlainImpedance, feedback_of
 from hsp_control.companions.play.playable import playable
 from hsp_control.companions.viewer import Viewer
-from hsp_control.companions.viewer.live_picture import Picture
+from hsp_control.companions.viewer.live_picture import Picture, _off
 
 PANDA = "panda_obstacle"
 COARSE = "simulation.control_period=0.002"  # at one of 1 ms the log repeats a drag
@@ -330,7 +330,12 @@ def test_it_begins_anew(session: Session) -> None:
     session.receive({"do": "set", "id": "null_space_gain", "value": 30.0})
     session.receive({"do": "obstacle", "name": "ball", "position": [0.4, 0.4, 0.4]})
     go(session, 0.3)
+    pull = {"do": "pull", "path": LINK, "point": [0.3, 0.0, 0.5], "to": [0.3, 0.0, 0.6]}
+    session.receive(pull)
+    go(session, 0.1)
+    assert session.rollout().meta["changes_lost"] == "a link was pulled"
     session.reset()
+    assert "changes_lost" not in session.rollout().meta  # it can be repeated
     assert session.handles.values["null_space_gain"] == 10.0
     assert not session.controller.changes
     go(session, 0.3)
@@ -555,6 +560,14 @@ def test_the_loop_follows_the_page_s_time_controls(session: Session) -> None:
 
 
 # --- sources of a play ---------------------------------------------------------------
+
+
+def test_a_hand_that_a_pull_holds_away_is_labelled_until_it_is_back() -> None:
+    """By the last of the rows since the picture before."""
+    away, back = [0.3, 0.4, 0.0], [0.0, 0.003, 0.004]
+    for rows, label in (([back, away], True), ([away, back], False)):
+        assert _off({"task.hand.error": np.array(rows)}, "hand") == label
+    assert not _off({}, "hand")
 
 
 def test_any_fixed_robot_is_a_playground() -> None:
