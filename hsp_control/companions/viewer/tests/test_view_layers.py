@@ -489,6 +489,47 @@ def comparison(
     return Clip(recorder), rest
 
 
+def shown_seconds(recorder: Recorder) -> list[float]:
+    return [float(n.split()[2]) for n in names(recorder) if "self-motion" in n]
+
+
+def test_the_arrows_of_compared_runs_have_one_scale(
+    planar: tuple[Experiment, Rollout],
+) -> None:
+    """Of the faster run, whose arrows fit in less time."""
+    experiment, rollout = planar
+    columns = {name: column.copy() for name, column in rollout.columns.items()}
+    slow = Rollout(columns, rollout.meta)
+    slow["field.g"][:] *= 0.02
+    slow.v[:] *= 0.02
+    robot, law = experiment.robot, experiment.controller
+    runs = [
+        ComparedRun("slow", robot, slow, law),
+        ComparedRun("as", robot, rollout, law),
+    ]
+    alone = []
+    for run in runs:
+        recorder = Recorder()
+        drawn(experiment, run.rollout, recorder)
+        alone += shown_seconds(recorder)
+    assert alone[0] > alone[1]
+    for order in (runs, runs[::-1]):
+        recorder = Recorder()
+        Viewer(robot, transport=recorder).compare(order, beside=True)
+        assert set(shown_seconds(recorder)) == {alone[1]}
+
+
+def test_three_robots_stand_at_equal_distances(
+    planar: tuple[Experiment, Rollout], recorder: Recorder
+) -> None:
+    experiment, rollout = planar
+    runs = [ComparedRun(name, experiment.robot, rollout, None) for name in "abc"]
+    Viewer(experiment.robot, transport=recorder).compare(runs, beside=True)
+    second, third = (recorder.transform(f"/{name}")[:3, 3] for name in "bc")
+    assert np.linalg.norm(second) > 1.0
+    np.testing.assert_allclose(third, 2.0 * second, rtol=1e-9)
+
+
 def test_runs_of_one_robot_lie_over_each_other_as_ghosts(
     planar: tuple[Experiment, Rollout], recorder: Recorder
 ) -> None:
