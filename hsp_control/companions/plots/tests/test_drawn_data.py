@@ -334,3 +334,14 @@ def test_of_many_curves_those_that_vary_most_have_a_name() -> None:
     assert found == np.flatnonzero(spreads >= 8.0).tolist()
     assert len(found) == log_series.SELECTED
     assert log_series.lively(values[:, :14]) == [*range(14)]
+
+
+def test_a_gap_does_not_make_a_curve_vary() -> None:
+    """Such as a distance to an obstacle that comes later."""
+    values = np.outer([0.0, 1.0, 0.5], np.linspace(0.01, 0.02, 15))
+    expected = [*range(8, 15)]
+    assert log_series.lively(values) == expected
+    values[:, 0] = [np.nan, 5.0, 5.0]
+    values[:, 1] = np.nan
+    values[:, 2] = [5.0, -np.inf, 5.0]
+    assert log_series.lively(values) == expected
