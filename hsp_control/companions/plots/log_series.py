@@ -114,7 +114,10 @@ def lively(values: Array) -> list[int]:
     """Return the columns that get a name, of shape (N, k)."""
     if values.shape[1] <= MAX_NAMED:
         return [*range(values.shape[1])]
-    spread = np.ptp(np.nan_to_num(values, posinf=0.0, neginf=0.0), axis=0)
+    known = np.isfinite(values)  # a gap is no variation
+    high = np.where(known, values, -np.inf).max(axis=0)
+    low = np.where(known, values, np.inf).min(axis=0)
+    spread = np.where(known.any(axis=0), high - low, 0.0)
     return sorted(np.argsort(-spread, kind="stable")[:SELECTED].tolist())
 
 

@@ -4,6 +4,7 @@ import copy
 import pickle
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from compensation_cases import ALL, EVERYTHING, PANDA, Q0, H, circle, controller
 from compensators import ALONE, only
 from numpy.testing import assert_allclose, assert_array_equal
 from places import covering, further
+from robot_kinds import KINDS
 from scipy.linalg import expm
 from task_cases import placed
 
@@ -221,6 +223,23 @@ def test_known_friction_costs_nothing_and_the_observer_leaves_it_alone() -> None
             assert np.abs(log["observer.disturbance"][late]).max() < 0.1 * friction
 
 
+def test_an_effort_that_is_reported_as_sent_changes_nothing() -> None:
+    """A live loop reports it every period; the friction in it is no disturbance."""
+    own = Compensation(
+        friction_feed_forward=FrictionFeedForward(coulomb=1.0, viscous=2.0),
+        momentum_observer=MomentumObserver(50.0),
+    )
+    reported, alone = (CompensatedController(controller(), own) for _ in range(2))
+    for k in range(30):
+        q = Q0 + 1e-3 * np.sin(0.1 * k + np.arange(7))
+        v = 0.1 * np.cos(0.1 * k + Q0)
+        tau = reported.effort(k * H, q, v, H).copy()
+        assert_array_equal(tau, alone.effort(k * H, q, v, H), err_msg=str(k))
+        reported.applied(tau, H)
+    friction = reported.log_channels()["friction.feed_forward"].value
+    assert np.abs(friction).max() > 0.5
+
+
 @pytest.mark.parametrize("levels", [1, 2, 3])
 def test_the_desired_velocity_is_the_law_s_flow(levels: int) -> None:
     """v_d = J# x_d' + P g for any v: the measured velocity and its noise cancel."""
@@ -335,6 +354,27 @@ def test_an_integral_only_unwinds_while_the_law_is_not_delivered() -> None:
     assert np.abs(offset).max() == pytest.approx(8.0)
 
 
+def test_an_integral_goes_on_where_other_tasks_come_and_go() -> None:
+    """It is the sum of all errors, over periods of H, up to rounding."""
+    made = controller()
+    command = CompensatedController(made, only(integral_action=IntegralAction(5.0)))
+    wrist = hsp.JointPosture(Q0, joints=["panda_joint7"], name="wrist")
+    total, q, names = np.zeros(3), Q0 + 0.02, set()
+    for k in range(60):
+        if k == 20:
+            made.at(k * H).ramp(0.01).add(wrist)
+        if k == 40:
+            made.at(k * H).ramp(0.01).remove("wrist")
+        command.effort(k * H, q, np.zeros(7), H)
+        total += H * command.output.error("hand")
+        columns = command.log_channels()
+        names |= set(columns)
+        found = columns["task.hand.integral"].value
+        assert_allclose(found, total, rtol=1e-12, err_msg=str(k))
+    assert "task.wrist.integral" in names
+    assert np.abs(total).max() > 1e-4
+
+
 # ------------------------------------------------------------------ other compensators
 
 
@@ -421,3 +461,24 @@ def test_the_ramp_leads_from_gravity_to_the_law(frequency: float) -> None:
         assert_array_equal(made.compute(here).tau, smooth.tau[k])
     # At first a spring holds the arm at its initial posture.
     assert np.abs(smooth.q[40] - q).max() < (0.02 if frequency else 0.03)
+
+
+def test_the_spring_of_a_ramp_pulls_back_a_ball_joint(tmp_path: Path) -> None:
+    """The blend of the efforts of spring and law, with s of the smooth step."""
+    robot, rng = KINDS["ball, rotors"](tmp_path), np.random.default_rng(0)
+    q0, rest, w = robot.neutral(), np.zeros(robot.nv), 10.0
+    place = robot.state(0.0, q0, rest).position("link2") + 0.1
+    made = hsp.Controller(
+        robot, [hsp.FramePosition("link2", hsp.Hold(place))], limits=None
+    )
+    command = CompensatedController(made, only(start_up_ramp=StartUpRamp(0.2, w)))
+    command.effort(0.0, q0, rest, H)
+    away, v = rng.uniform(-0.3, 0.3, robot.nv), rng.uniform(-1.0, 1.0, robot.nv)
+    q = robot.integrate(q0, away)
+    tau = command.effort(0.05, q, v, H).copy()
+    law = made.compute(0.05, q, v).tau
+    state, u = robot.state(0.05, q, v), 0.25
+    s = u**3 * (10.0 - 15.0 * u + 6.0 * u**2)
+    spring = state.mass_matrix @ (-w * w * away - 2.0 * w * v)
+    held = spring + state.nonlinear_effects
+    assert_allclose(tau, (1.0 - s) * held + s * law, rtol=1e-9, atol=1e-9)

@@ -23,7 +23,11 @@ from hsp_control.control.compensation import (
 )
 from hsp_control.control.first_state import StartWarning
 from hsp_control.live.loop import run_loop
+from hsp_control.live.settings import LiveSettings
 from hsp_control.live.simulated_robot import InProcessRobot
+from hsp_control.live.state_reader import DeadReckoning
+from hsp_control.live.still_sensors import StillSensors
+from hsp_control.live.trusted_motion import TrustedMotion
 from hsp_control.null_space.metrics import IdentityMetric, MassMatrixMetric, Metric
 from hsp_control.robot.gravity import Gravity
 from hsp_control.simulation import plants
@@ -397,6 +401,44 @@ def test_a_live_robot_and_its_safe_stop_carry_it(tmp_path: Path) -> None:
     assert moved < 1e-3
     assert np.abs(arm.tau - experiment.robot.state(0.0, arm.q, 0 * arm.v)
                   .nonlinear_effects).max() > 5.0  # fmt: skip
+
+
+def test_the_checks_of_a_live_loop_carry_it() -> None:
+    """Predicted states, efforts beyond holding ones, and changes of momentum."""
+    made, model, settings = controller(), loaded(1.0), LiveSettings()
+    robot, rng, rest = made.robot, np.random.default_rng(4), np.zeros(7)
+    q, v, tau = start(robot), rng.normal(size=7), 10.0 * rng.normal(size=7)
+    made.restart(origin=0.0)
+    made.compute(5.0, q, v)  # after the ramp
+    dynamics, data = made.state.dynamics, model.createData()
+    M = pin.crba(model, data, q)
+    M = np.triu(M) + np.triu(M, 1).T
+    free = pin.aba(model, data, q, v, tau).copy()
+    close = {"rtol": 1e-9, "atol": 1e-9}
+
+    reckoning = DeadReckoning(robot, 1e-3, dynamics)
+    reckoning.correct(5.0, q, v)
+    reckoning.predict(tau)
+    np.testing.assert_allclose(reckoning.state.v, v + 1e-3 * free, **close)
+
+    still = StillSensors(robot, settings, np.full(7, 100.0), 1e-3)
+    moves = np.ones(7)
+    moves[2] = 0.0  # its readings stay the same to the last bit
+    for k in range(100):
+        noise = moves * np.sin(k)
+        still.update(1e-4 * noise, v + 0.1 * noise, v, 1e-3)
+    still.judge(q, v, tau, dynamics)
+    holding = free[2] / np.linalg.inv(M)[2, 2]
+    np.testing.assert_allclose(still.beyond, holding * np.eye(7)[2], **close)
+
+    motion = TrustedMotion(robot, settings, 1e-3, dynamics)
+    motion.applied(q, v, tau, rest)
+    driving = motion._driving
+    assert driving is not None
+    np.testing.assert_allclose(driving.inertia, M, **close)
+    np.testing.assert_allclose(driving.effort, M @ free, **close)
+    gravity = pin.rnea(model, data, q, rest, rest)
+    np.testing.assert_allclose(driving.gravity, gravity, **close)
 
 
 @pytest.mark.parametrize("change", ["payload", "gravity"])

@@ -906,3 +906,39 @@ def test_a_robot_that_stops_by_itself_does_not_throw_its_wrist() -> None:
         robot.advance([])
         fastest = np.maximum(fastest, np.abs(robot.v))
     assert (fastest[4:] <= np.maximum(FASTER * speed[4:], 0.3)).all()
+
+
+class Runaway(Rig):
+    """A robot whose last motor exerts 4 N·m from the safe stop on, whatever is sent."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.stopping = False
+
+    def write(self, effort: Array) -> None:
+        super().write(np.append(effort[:6], 4.0) if self.stopping else effort)
+
+    def read(self, timeout: float) -> Measurement | None:
+        found = super().read(timeout)
+        assert found is not None
+        return found._replace(applied=None)
+
+
+def test_a_motor_that_runs_away_in_the_stop_is_left_to_the_robot() -> None:
+    """Both sensors agree; a braked joint that accelerates shows that no effort helps.
+
+    It does so within 0.1 s; the robot's own stop then has all its motors.
+    """
+    robot, requests = Runaway(), hsp.live.OperatorRequests()
+
+    def stop(t: float) -> None:
+        if t > 0.1:
+            robot.stopping = True
+            requests.stop("enough")
+
+    report = run_loop(resting(), robot, requests=requests, on_period=stop)
+    assert report.ended == "fault"
+    assert report.reason.startswith("enough; then panda_joint7 is braked, and moves at")
+    assert "its motor does not follow the efforts" in report.reason
+    assert report.silent
+    assert report.t < 0.2

@@ -27,7 +27,9 @@ from hsp_control.common.errors import HardwareError, LiveError
 from hsp_control.constraints.limits import PositionRange
 from hsp_control.control.changes import Changes
 from hsp_control.control.compensation import CompensatedController
+from hsp_control.control.estimation import Estimator, RunningEstimator
 from hsp_control.control.first_state import StartWarning
+from hsp_control.control.measurement import Inertial, LogChannel
 from hsp_control.live import (
     Hardware,
     LiveSettings,
@@ -128,6 +130,34 @@ def test_tau_less_gravity_is_the_same_motion() -> None:
     assert np.abs(relieved[-1]).max() < 0.05
 
 
+@pytest.mark.parametrize("compensates", [False, True])
+def test_estimators_and_plans_get_the_efforts_of_the_motors(compensates: bool) -> None:
+    """Also of a robot that adds g(q) itself, and reports its efforts without it."""
+    settings = LiveSettings(compensates_gravity=compensates)
+    rig = Rig(watched(settings))
+    efforts: list[tuple[Array, Array]] = []
+
+    class Listening(RunningEstimator):
+        def update(self, measured: Measurement) -> Measurement:
+            if measured.applied is not None:
+                efforts.append((measured.applied, rig.robot.tau.copy()))
+            return measured
+
+        def log_channels(self, q: Array, v: Array) -> dict[str, LogChannel]:
+            return {}
+
+    class Listens(Estimator):
+        def begin(
+            self, controller: hsp.Controller, inertial: Inertial | None
+        ) -> Listening:
+            return Listening()
+
+    run_loop(law(), rig, duration=0.05, estimators=[Listens()], settings=settings)
+    assert len(efforts) >= 49
+    for given, applied in efforts:
+        np.testing.assert_allclose(given, applied, rtol=0, atol=1e-9)  # up to 40 N·m
+
+
 # --- with faults: the safe stop ------------------------------------------------------
 
 
@@ -215,6 +245,17 @@ def test_field_gains_and_tasks_change_without_a_jump(tmp_path: Path) -> None:
     assert np.isnan(run["task.elbow.error"][run.t > 0.83]).all()
     assert np.isnan(run["field.other.g"][run.t < 0.09]).all()
     assert list(run.meta["tasks"]) == ["tip", "elbow"]  # a removed one is drawn, too
+
+
+def test_requested_changes_are_made_in_their_order() -> None:
+    """Also one that is requested by a change, and none twice."""
+    requests, made = OperatorRequests(), list[int]()
+    for k in range(3):
+        requests.call(lambda k=k: made.append(k))
+    requests.call(lambda: requests.call(lambda: made.append(3)))
+    requests.run_pending()
+    requests.run_pending()
+    assert made == [0, 1, 2, 3]
 
 
 def test_a_task_of_another_form_is_logged_by_another_name() -> None:

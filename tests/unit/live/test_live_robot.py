@@ -67,6 +67,26 @@ def test_efforts_beyond_its_limits_stop_it(
     assert np.abs(robot.v).max() < 0.01
 
 
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_robot_that_adds_gravity_accepts_every_effort_of_its_motors(
+    sign: float,
+) -> None:
+    """It is sent tau - g(q), which may be larger than the limit of tau."""
+    robot, g = watched(LiveSettings(compensates_gravity=True)), gravity(start())
+    i = int(np.abs(g).argmax())
+    assert abs(g[i]) > 10.0
+    limit = LiveSettings().effort_limits(panda())[i]
+    effort = np.zeros(7)
+    effort[i] = sign * limit - g[i]
+    robot.advance([effort])
+    assert robot.phase is Phase.RUNNING, robot.reason
+    assert robot.tau[i] == pytest.approx(sign * limit, rel=1e-12)
+    beyond = np.zeros(7)
+    beyond[i] = -np.sign(g[i]) * (limit + abs(g[i]) + 0.1)
+    robot.advance([beyond])
+    assert f"{panda().dof_names[i]} was sent" in robot.reason
+
+
 @settings(max_examples=60)
 @given(
     efforts=st.lists(

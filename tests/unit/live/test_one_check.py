@@ -7,6 +7,7 @@ from loaded_robots import panda
 
 from hsp_control.common.arrays import Array, Flags
 from hsp_control.live import LiveSettings, Measurement
+from hsp_control.live.expected_motion import ExpectedMotion
 from hsp_control.live.reaction_check import ReactionCheck
 from hsp_control.live.trusted_motion import TrustedMotion
 from hsp_control.live.velocity_check import VelocityCheck
@@ -127,6 +128,25 @@ def test_a_source_that_is_trusted_again_is_expected_where_it_is() -> None:
     assert trusted.trusted_positions.all()
 
 
+def test_a_joint_is_expected_by_the_source_that_is_still_trusted() -> None:
+    """As before the last step, which the wrong source may have made; or as neither."""
+    expected = ExpectedMotion(panda(), 0.3, PERIOD, panda().dynamics())
+    expected.begin(np.zeros(7))
+    trusted = np.ones((2, 7), dtype=bool)
+    for _ in range(2):  # measured velocities and slopes differ
+        expected.follow(
+            np.stack([np.full(7, 0.2), np.full(7, -0.2)]), trusted, PERIOD, braked=False
+        )
+    by_v, by_q, mean = expected.before.copy()
+    assert (by_v > 0.0).all()
+    assert (by_q < 0.0).all()
+    kept = expected.v[2, 3:].copy()
+    trusted[:, :3] = [[True, False, False], [False, True, False]]
+    expected.leave(~trusted.all(axis=0), trusted)
+    np.testing.assert_array_equal(expected.v[2, :3], [by_v[0], by_q[1], mean[2]])
+    np.testing.assert_array_equal(expected.v[2, 3:], kept)
+
+
 @pytest.mark.parametrize("period", [0.001, 0.005, 0.01])
 def test_noise_of_a_velocity_is_no_motion(period: float) -> None:
     motion, rng = Motion(period), np.random.default_rng(0)
@@ -139,6 +159,24 @@ def test_noise_of_a_velocity_is_no_motion(period: float) -> None:
         motion.update(0.2, 0.2)
     assert motion.trusted.mean_velocity is not None
     np.testing.assert_allclose(motion.trusted.mean_velocity, 0.2 * np.eye(7)[6])
+
+
+@pytest.mark.parametrize("stops", [False, True])
+def test_in_a_stop_a_known_load_may_hold_a_joint(stops: bool) -> None:
+    """Before, it may be a dead sensor: the joint should move, but stays to the bit."""
+    trusted, q, rest = TrustedMotion(panda(), SETTINGS, PERIOD), start(), np.zeros(7)
+    load = np.array([0.0, 25.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+    if stops:
+        trusted.stop()
+    faults = []
+    for k in range(1, 200):
+        passed = PERIOD if k > 1 else 0.0
+        trusted.update(Measurement(k, k * PERIOD, q, rest), passed, rest > 0.0)
+        trusted.applied(q, rest, gravity(q) - load, load)
+        faults.append(trusted.fault)
+    found = [each for each in faults if each is not None]
+    assert bool(found) != stops, found
+    assert all("panda_joint2 stays the same to the last bit" in each for each in found)
 
 
 def test_one_noisy_velocity_of_a_braked_joint_is_no_acceleration() -> None:

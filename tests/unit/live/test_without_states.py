@@ -115,6 +115,28 @@ def test_an_effort_is_held_for_ten_milliseconds_then_the_robot_brakes() -> None:
     assert speeds[-1] > speeds[end]
 
 
+def test_braking_begins_anew_when_states_are_missing_again() -> None:
+    """Otherwise the robot is pulled back to where it was held some time before."""
+    stop, lost, held = StopSettings(longest_damping=0.01), 30, 10
+    gaps = (100, 250)
+    reads = [read for begin in gaps for read in range(begin, begin + lost)]
+    rig, v = Rig(watched(), dict.fromkeys(reads, missing)), list[Array]()
+    settings = LiveSettings(missing=50, stop=stop)
+    report = run_loop(
+        law(),
+        rig,
+        duration=0.35,
+        settings=settings,
+        on_period=lambda _: v.append(rig.robot.v.copy()),
+    )
+    assert report.ended == "completed", report.reason
+    left = np.exp(-stop.damping * 8 * PERIOD)
+    for begin in (gap + held for gap in gaps):  # damped for ten periods, then held
+        assert np.abs(v[begin]).max() > 0.5
+        # Of predicted states: 0.02 rad/s off; a pull back makes 0.1 in the second gap.
+        np.testing.assert_allclose(v[begin + 8], left * v[begin], rtol=0, atol=0.04)
+
+
 def test_an_effort_is_held_over_two_lost_states_of_a_long_period() -> None:
     """At 10 ms, too: often two of them are lost in a row on a bad line."""
     lost = {read for read in range(10, 90) if read % 10 < 2}

@@ -19,10 +19,12 @@ from hsp_control.robot.description.sources import find_robot
 from hsp_control.robot.friction import Friction, JointFriction
 from hsp_control.robot.integrators import Dop853, Rk4
 from hsp_control.simulation.plants import (
+    ContactPlant,
     ImperfectPlant,
     IntegratedPlant,
     Push,
     RigidBodyPlant,
+    RigidContact,
     SampledPlant,
     StickingPlant,
 )
@@ -372,6 +374,34 @@ def test_an_effort_later_than_its_period_begins_the_next() -> None:
     ]
 
 
+def test_delays_of_all_drives_add_up() -> None:
+    """Also of those before drives without any: the same jitter, clipped efforts."""
+    jitter = timeline(Jitter(0.5))
+    assert len(jitter) == 15  # the first effort acts at once
+    found = timeline(Jitter(0.5), EffortNoise(0.0), Saturation(4.0))
+    assert found == [(a, b, min(effort, 4.0)) for a, b, effort in jitter]
+
+
+def test_contacts_are_felt_under_the_effort_that_acted() -> None:
+    """A late effort does not press yet: as the plant's own wrenches."""
+    robot, h = load("panda"), 1e-3
+    engine = ContactPlant(robot, [RigidContact("panda_tcp", kind="point")])
+    plant = ImperfectPlant(IntegratedPlant(engine, Rk4(h)), drives=[EffortDelay(1)])
+    q, rest = robot.home(), np.zeros(7)
+    first = robot.inverse_dynamics(q, rest, rest)
+    second = first + 10.0
+    plant.reset(0.0, q, rest)
+    for k, tau in enumerate((first, second)):
+        plant.advance(k * h, (k + 1) * h, tau)
+    given = 2 * h, q, rest
+    early, late = (
+        engine.contact_wrenches(*given, tau)["panda_tcp"] for tau in (first, second)
+    )
+    felt = plant.contact_wrenches(*given, second)["panda_tcp"]
+    np.testing.assert_array_equal(felt, early)
+    assert np.abs(late - early).max() > 10.0
+
+
 # --- pushes --------------------------------------------------------------------------
 
 
@@ -396,6 +426,22 @@ def test_a_push_gives_its_impulse_to_any_plant(kind: str) -> None:
     # RK4's stages may misplace an edge by a third of a step.
     exact = 1e-9 if kind != "ideal" else 1e-3
     assert moved(plant, 0.0, 1.0, 0.0)[1] == pytest.approx(0.75, rel=exact)
+
+
+@pytest.mark.parametrize(("start", "duration"), [(0.1, 0.2), (0.3, 0.4), (0.2, 0.1)])
+def test_a_push_on_mujoco_lasts_as_many_steps_as_it_should(
+    start: float, duration: float
+) -> None:
+    """Also where a step begins at 0.3 s and the push ends at 0.1 s + 0.2 s, later."""
+    engine = pytest.importorskip("hsp_control.companions.mujoco.plant")
+    robot = cart()
+    robot.model.addFrame(
+        pin.Frame("body", 1, 0, pin.SE3.Identity(), pin.FrameType.BODY)
+    )
+    push = Push("body", (3.0, 0.0, 0.0), start=start, duration=duration)
+    plant = engine.MujocoPlant(changed(robot, []), engine.Mujoco(pushes=[push]))
+    v = moved(plant, 0.0, 1.0, 0.0)[1]
+    assert v == pytest.approx(3.0 * duration / 2.0, rel=1e-9)
 
 
 # --- the whole loop ------------------------------------------------------------------

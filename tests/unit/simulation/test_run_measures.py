@@ -30,7 +30,7 @@ def changed_run() -> hsp.Rollout:
         if column.dtype == float and name not in ("t", "q"):
             column[...] = rng.uniform(-3.0, 2.0, column.shape)
     run["damped"][:] = [1, 0, 0, 1, 1, 0]
-    run.t[:] = [0.0, 0.1, 0.2, 0.4, 0.5, 0.7]
+    run.t[:] = [1.0, 1.1, 1.2, 1.4, 1.5, 1.7]  # a run may begin at any time
     return run
 
 

@@ -138,3 +138,23 @@ def test_a_field_that_is_not_known_at_the_end_is_not_beyond_the_limits() -> None
     run.columns["status"][:] = 2.0
     run.columns["null_space_norm"][:] = np.nan
     assert run_summary.beyond_limits(run) == ""
+
+
+def test_a_field_demands_more_than_the_limits_allow_where_they_bind_to_the_end() -> (
+    None
+):
+    """In all of the last tenth of the rows; a limit that binds at times prevents
+    nothing."""
+    run = damped_run()
+    last = len(run) // 10
+    assert last > 1
+    run["field.g"][-1] = 0.0
+    run["field.g"][-1, 0] = 2.0
+    run["null_space_norm"][-1] = 1.5
+    for status in (2.0, 4.0):  # limited, beyond
+        run["status"][:] = 0.0
+        run["status"][-last:] = status
+        text = run_summary.beyond_limits(run)
+        assert "demands more than the limits allow: |g| 2" in text
+        run["status"][-last] = 0.0
+        assert run_summary.beyond_limits(run) == ""

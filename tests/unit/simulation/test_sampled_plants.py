@@ -3,6 +3,7 @@
 from typing import Any
 
 import numpy as np
+import pinocchio as pin
 import pytest
 from closed_loops import load, planar_controller, planar_start
 from compensators import ALONE
@@ -13,6 +14,7 @@ from hsp_control.common.errors import SimulationError
 from hsp_control.control.measurement import LogChannel
 from hsp_control.robot.integrators import Rk4
 from hsp_control.simulation.plants import IntegratedPlant, Plant, RigidBodyPlant
+from hsp_control.simulation.plants.plant import FloatingRoots
 
 
 class Sampled(IntegratedPlant):
@@ -108,3 +110,24 @@ def test_a_plant_with_other_joints_is_refused() -> None:
     message = r"^the plant moves panda with the joints panda_joint1, .* planar3r has "
     with pytest.raises(SimulationError, match=message):
         simulate(planar_controller(), planar_start(), duration=0.1, plant=plant)
+
+
+def test_no_root_of_two_floating_robots_has_a_motor() -> None:
+    """The second one begins at another index in q than in v."""
+    model = pin.Model()
+    for k in range(2):
+        root = model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), f"b{k}")
+        leg = model.addJoint(root, pin.JointModelRX(), pin.SE3.Identity(), f"leg{k}")
+        for joint in (root, leg):
+            body = pin.Inertia.FromBox(1.0, 0.3, 0.2, 0.1)
+            model.appendBodyToJoint(joint, body, pin.SE3.Identity())
+        model.addBodyFrame(f"trunk{k}", root, pin.SE3.Identity(), 0)
+    roots = FloatingRoots(Robot.from_pinocchio(model))
+    motors = np.zeros(14)
+    motors[[6, 13]] = 2.0, 3.0  # of the legs
+    np.testing.assert_array_equal(roots.remove_effort(0.0, motors), motors)
+    for dof in {*range(14)} - {6, 13}:
+        pushed = motors.copy()
+        pushed[dof] = 1.0
+        with pytest.raises(SimulationError, match="the root has no motor"):
+            roots.remove_effort(0.0, pushed)

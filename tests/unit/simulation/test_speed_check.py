@@ -71,3 +71,14 @@ def test_without_limits_nothing_is_reported() -> None:
     law = hsp.Controller(robot, [task])
     requested = robot, law.tasks, robot.home(), 2.0, (), None
     assert list(not_followed(*requested)) == []
+
+
+def test_joints_without_a_limit_may_be_as_fast_as_they_need() -> None:
+    """Two of three joints can move the tip alone, also beside a slow one."""
+    robot = hsp.Robot.load("planar3r")
+    line = hsp.Line([0.0, 9.0], 1.0, start=[0.0, 0.0])
+    task = hsp.FramePosition("tip", line, axes="xy")
+    passed = [Passed(0.5, robot.home(), 0.0)]
+    for limit in ([np.inf] * 3, [np.inf, np.inf, 0.1]):
+        assert too_fast(robot, task, passed, np.array(limit)) is None
+    assert too_fast(robot, task, passed, np.array([np.inf, 0.1, 0.1])) is not None

@@ -77,6 +77,8 @@ def test_an_exception_is_reported_with_its_names() -> None:
     reported = explained("ControlException", text)
     parts = "joint_reflex: ", "collision_torque", "power_limit_violation: ", "0.97"
     assert all(part in reported for part in parts)
+    flag = 'motion aborted by reflex! ["tau_J_range_violation_flag"]'
+    assert explained("ControlException", flag).startswith("tau_j_range_violation: a ")
     stopped = "libfranka: Move command aborted: User Stop pressed!"
     assert "stop button was pressed" in explained("ControlException", stopped)
     other = explained("ValueError", "something new\nand more")

@@ -205,11 +205,17 @@ def test_a_robot_in_self_collision_is_reported_once(
     scene = """<mujoco><worldbody>
       <body name="stand"><geom size="0.1"/>
         <body name="arm" pos="0 0 {height}">
-          <joint name="turn"/><geom size="0.1"/>
+          <joint name="turn"/>{deeper}<geom size="0.1" pos="0.1 0 0.02"/>{last}
         </body>
       </body></worldbody></mujoco>"""
-    for height, reported in ((0.15, ["stand and arm (50 mm)"]), (0.2001, [])):
-        model = mujoco.MjModel.from_xml_string(scene.format(height=height))
+    # Of two contacts the deeper one is reported, in any order.
+    deeper, told = '<geom size="0.1"/>', ["stand and arm (50 mm)"]
+    for height, order, reported in (
+        (0.15, {"deeper": deeper, "last": ""}, told),
+        (0.15, {"deeper": "", "last": deeper}, told),
+        (0.2001, {"deeper": deeper, "last": ""}, []),
+    ):
+        model = mujoco.MjModel.from_xml_string(scene.format(height=height, **order))
         robot = Robot.from_mujoco(model, "stand", ["turn"])
         plant = MujocoScenePlant(robot, model, mujoco.MjData(model))
         caplog.clear()

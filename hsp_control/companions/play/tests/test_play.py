@@ -20,7 +20,7 @@ from hsp_control.companions.play.other_law import PLAIN, OtherLaw
 from hsp_control.companions.play.plain_impedance import PlainImpedance, feedback_of
 from hsp_control.companions.play.playable import playable
 from hsp_control.companions.viewer import Viewer
-from hsp_control.companions.viewer.live_picture import Picture
+from hsp_control.companions.viewer.live_picture import Picture, _off
 
 PANDA = "panda_obstacle"
 COARSE = "simulation.control_period=0.002"  # at one of 1 ms the log repeats a drag
@@ -157,6 +157,23 @@ def test_a_return_is_no_jolt(still: Session) -> None:
     assert not rows["status"].any()
 
 
+def test_a_return_while_time_stands_still_is_shown_at_once(still: Session) -> None:
+    """A handle is where its own path is, not where it was dragged in that instant."""
+    go(still, 0.1)
+    targets, obstacles = still.handles.places()
+    far = np.add(targets["hand"], [0.0, 0.3, 0.0, 0.0, 0.0, 0.0, 0.0]).tolist()
+    away = np.add(obstacles["ball"], [0.0, 0.0, 0.5]).tolist()
+    still.receive({"do": "move", "target": "hand", "pose": far})
+    still.receive({"do": "obstacle", "name": "ball", "position": away})
+    dragged = still.handles.places()
+    assert (dragged[0]["hand"], dragged[1]["ball"]) == (far, away)
+    still.receive({"do": "resume", "target": "hand"})
+    still.receive({"do": "resume", "name": "ball"})
+    returned = still.handles.places()
+    np.testing.assert_allclose(returned[0]["hand"], targets["hand"], atol=1e-9)
+    np.testing.assert_allclose(returned[1]["ball"], obstacles["ball"], atol=1e-9)
+
+
 LINK = "/robot/panda_joint4"
 BAD: list[dict[str, Any]] = [
     {"do": "move", "target": "foot", "pose": [0.0] * 7},
@@ -193,10 +210,16 @@ def test_nonsense_is_answered_and_moves_nothing(
 
 
 class Told:
-    """Records the gains set by a knob."""
+    """Records the gains and the weights set by a knob."""
+
+    def __init__(self) -> None:
+        self.weights: list[tuple[str, float]] = []
 
     def gains(self, name: str, gains: hsp.Gains) -> None:
         self.made = gains.matrices(6)
+
+    def weight(self, name: str, weight: float) -> None:
+        self.weights.append((name, weight))
 
 
 def test_knobs_keep_damping_ratios() -> None:
@@ -212,6 +235,22 @@ def test_knobs_keep_damping_ratios() -> None:
     for period, high in ((0.001, 50.0), (0.02, 10.0), (1.0, 5.0)):
         knob = knobs_of(controller, period)["frequency.hand"]
         assert (knob.low, knob.high) == pytest.approx((0.5, high))
+
+
+def test_a_field_that_is_switched_on_again_has_the_weights_of_the_sliders() -> None:
+    """Also one that was moved while the field was off, which had no effect then."""
+    controller, reported = hsp.load_experiment(PANDA).controller, Told()
+    knobs = knobs_of(controller, 0.001)
+    sliders = [name for name in knobs if name.startswith("weight.")]
+    assert len(sliders) > 1
+    terms = {name.removeprefix("weight."): knobs[name].value for name in sliders}
+    first, second, *_ = terms
+    knobs[f"weight.{first}"].turn(reported, 3.0)  # type: ignore[arg-type]
+    knobs["field"].turn(reported, False)  # type: ignore[arg-type]
+    knobs[f"weight.{second}"].turn(reported, 5.0)  # type: ignore[arg-type]
+    knobs["field"].turn(reported, True)  # type: ignore[arg-type]
+    off, on = dict.fromkeys(terms, 0.0), terms | {first: 3.0, second: 5.0}
+    assert reported.weights == [(first, 3.0), *off.items(), *on.items()]
 
 
 def test_a_slider_that_is_dragged_makes_few_changes(session: Session) -> None:
@@ -291,7 +330,12 @@ def test_it_begins_anew(session: Session) -> None:
     session.receive({"do": "set", "id": "null_space_gain", "value": 30.0})
     session.receive({"do": "obstacle", "name": "ball", "position": [0.4, 0.4, 0.4]})
     go(session, 0.3)
+    pull = {"do": "pull", "path": LINK, "point": [0.3, 0.0, 0.5], "to": [0.3, 0.0, 0.6]}
+    session.receive(pull)
+    go(session, 0.1)
+    assert session.rollout().meta["changes_lost"] == "a link was pulled"
     session.reset()
+    assert "changes_lost" not in session.rollout().meta  # it can be repeated
     assert session.handles.values["null_space_gain"] == 10.0
     assert not session.controller.changes
     go(session, 0.3)
@@ -516,6 +560,14 @@ def test_the_loop_follows_the_page_s_time_controls(session: Session) -> None:
 
 
 # --- sources of a play ---------------------------------------------------------------
+
+
+def test_a_hand_that_a_pull_holds_away_is_labelled_until_it_is_back() -> None:
+    """By the last of the rows since the picture before."""
+    away, back = [0.3, 0.4, 0.0], [0.0, 0.003, 0.004]
+    for rows, label in (([back, away], True), ([away, back], False)):
+        assert _off({"task.hand.error": np.array(rows)}, "hand") == label
+    assert not _off({}, "hand")
 
 
 def test_any_fixed_robot_is_a_playground() -> None:

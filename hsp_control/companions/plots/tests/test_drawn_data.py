@@ -30,6 +30,7 @@ from hsp_control.companions.plots import log_series, palette, world
 from hsp_control.companions.plots.log_series import decay_power, predicted_decay
 from hsp_control.companions.viewer.targets import read_targets
 from hsp_control.geometry import Scene, shapes
+from hsp_control.geometry.shapes import shape_to_log
 from hsp_control.null_space.metrics import CoordinatesMetric
 from hsp_control.simulation import measures
 from hsp_control.tasks.feedback import ErrorPart
@@ -249,6 +250,31 @@ def test_obstacles_are_their_outlines(logs: dict[str, Rollout]) -> None:
         figure.canvas.draw()
 
 
+@pytest.mark.parametrize(("shape", "low", "high"), [
+    (shapes.Sphere(0.1), [-0.1] * 3, [0.1] * 3),
+    (shapes.Capsule(0.05, 0.3), [-0.05, -0.05, -0.2], [0.05, 0.05, 0.2]),
+    (shapes.Cylinder(0.05, 0.2), [-0.05, -0.05, -0.1], [0.05, 0.05, 0.1]),
+    (shapes.Box((0.1, 0.2, 0.3)), [-0.05, -0.1, -0.15], [0.05, 0.1, 0.15]),
+    (
+        shapes.PointCloud([[0.0, 0, 0], [0.1, 0, 0]], 0.02),
+        [-0.01] * 3,
+        [0.11, 0.01, 0.01],
+    ),
+    (
+        shapes.HeightField((0.2, 0.4), [[0.0, 0.1], [0.1, 0.3]]),
+        [-0.1, -0.2, 0.0],
+        [0.1, 0.2, 0.3],
+    ),
+])  # fmt: skip
+def test_an_obstacle_is_drawn_as_large_as_it_is(
+    shape: shapes.Shape, low: list[float], high: list[float]
+) -> None:
+    """Outlines that are too large contain all of its points, too."""
+    points, radius = world._POINTS_OF_SHAPE[type(shape).__name__](shape_to_log(shape))
+    np.testing.assert_allclose(points.min(axis=0) - radius, low, atol=1e-12)
+    np.testing.assert_allclose(points.max(axis=0) + radius, high, atol=1e-12)
+
+
 # --- the prediction of e_N -----------------------------------------------------------
 
 
@@ -298,3 +324,24 @@ def test_a_matrix_gain_predicts_a_band_and_the_log_lies_in_it(
     untold = changed(run, metric_matrix=None)
     (unknown, *_) = legend_texts(drawn(plots.draw_null_space_error, untold))[::-1]
     assert unknown == "no prediction: $K_N$ is a matrix, $W$ not in the log"
+
+
+def test_of_many_curves_those_that_vary_most_have_a_name() -> None:
+    """Seven of more than fourteen, in their order."""
+    spreads = np.random.default_rng(1).permutation(15).astype(float)
+    values = 100.0 - np.outer([0.0, 1.0, 0.5], spreads)
+    found = log_series.lively(values)
+    assert found == np.flatnonzero(spreads >= 8.0).tolist()
+    assert len(found) == log_series.SELECTED
+    assert log_series.lively(values[:, :14]) == [*range(14)]
+
+
+def test_a_gap_does_not_make_a_curve_vary() -> None:
+    """Such as a distance to an obstacle that comes later."""
+    values = np.outer([0.0, 1.0, 0.5], np.linspace(0.01, 0.02, 15))
+    expected = [*range(8, 15)]
+    assert log_series.lively(values) == expected
+    values[:, 0] = [np.nan, 5.0, 5.0]
+    values[:, 1] = np.nan
+    values[:, 2] = [5.0, -np.inf, 5.0]
+    assert log_series.lively(values) == expected

@@ -114,11 +114,12 @@ def test_a_links_mesh_is_drawn_of_any_format(ending: str, tmp_path: Path) -> Non
     else:
         tetrahedron(file)
     urdf = tmp_path / "arm.urdf"
-    mesh = f'<geometry><mesh filename="{file}"/></geometry>'
+    scaled = f'<mesh filename="{file}" scale="2 0.5 1"/>'
+    mesh = f"<geometry>{scaled}</geometry>"
     shape = f"<visual>{mesh}</visual>"
     urdf.write_text(
         robot_xml(link("a"), link("b", INERTIA + shape), joint("j", "a", "b"))
     )
     (visual,) = read_visuals(hsp.Robot.load(urdf))
     (drawn,) = _archetypes(Rerun(), visual, "link")
-    np.testing.assert_allclose(extent(drawn), [np.zeros(3), [1.0, 2.0, 3.0]])
+    np.testing.assert_allclose(extent(drawn), [np.zeros(3), [2.0, 1.0, 3.0]])

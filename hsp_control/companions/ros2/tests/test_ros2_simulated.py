@@ -67,6 +67,19 @@ def test_a_loop_over_the_wire_comes_to_its_end(served: Served) -> None:
     assert served.ended() == "the loop closed the connection"
 
 
+def test_efforts_of_another_order_reach_their_joints() -> None:
+    order = [3, 0, 1, 2, 6, 4, 5]  # not its own inverse
+    controller, _, address = fresh()
+    names = ",".join(panda().dof_names[k] for k in order)
+    topics = RobotTopics(f"{address}&joints={names}", panda())
+    sender = Node(DOMAIN).publisher(f"{controller}/commands", Float64MultiArray)
+    assert sender.matched == 1
+    sender.send(Float64MultiArray(MultiArrayLayout(), list(map(float, order))))
+    assert topics.wait(LONG)
+    (effort,) = topics.efforts(1)
+    np.testing.assert_array_equal(effort, np.arange(7.0))
+
+
 def wrong_size(send: Callable[[list[float]], None], _: Served) -> None:
     send([0.0] * 6)
 

@@ -4,6 +4,7 @@ import re
 from collections.abc import Callable
 from time import monotonic
 from typing import Any
+from weakref import ref
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from wording import wording
 
 from hsp_control import Stream, StreamPose
 from hsp_control.common.errors import StreamError
+from hsp_control.companions.ros2 import targets
 from hsp_control.companions.ros2.messages import (
     Header,
     Point,
@@ -75,6 +77,32 @@ def test_a_stream_uses_its_part_of_a_pose(space: Space, value: Any) -> None:
     other = Node(DOMAIN).publisher(publisher.topic, PoseStamped)
     until(lambda: publisher.send(pose()) or other.send(pose()) or inbox.rejected)
     assert re.search(r"r \d+ is ignored: publisher \d+ sent first", inbox.reason)
+
+
+def test_the_silence_of_the_only_publisher_is_told_once(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    """Its reference rests meanwhile; by a clock of this test, [s]."""
+    there = [Inbox(POSITION, "ros2://hand")]
+    times = iter([0.0, 0.1, 1.9, 2.2, 9.0])
+    queue = {0.0: [pose(0)], 0.1: [pose(0)]}
+    now = 0.0
+
+    class Subscription:
+        def wait(self, timeout: float) -> bool:
+            nonlocal now
+            now = next(times, np.inf)
+            if now == np.inf:
+                there.clear()
+            return now in queue
+
+        def take(self) -> list[tuple[PoseStamped, int]]:
+            return [(message, 7) for message in queue[now]]
+
+    monkeypatch.setattr(targets, "monotonic", lambda: now)
+    targets._listen(Subscription(), {}, POSITION, ref(there[0]))  # type: ignore[arg-type]
+    (told,) = caplog.messages
+    assert "publisher 7 has been silent for 2 s" in told
 
 
 @pytest.mark.parametrize(("wrong", "reason"), [

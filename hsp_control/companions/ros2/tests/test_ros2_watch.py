@@ -66,6 +66,17 @@ def test_a_pose_has_its_orientation_and_a_plane_is_no_pose() -> None:
     assert flat.take() == []
 
 
+def test_a_point_along_two_axes_is_no_pose() -> None:
+    prefix, _, _ = fresh()
+    flat = FramePosition("panda_tcp", Stream(), axes="xy", name="flat")
+    command = CompensatedController(Controller(panda(), [flat]))
+    watched = publish(f"ros2:/{prefix}?domain={DOMAIN}", command)
+    poses = received(f"{prefix}/flat/actual")
+    command.effort(0.0, start(), REST, 0.001)
+    watched(0.0)
+    assert poses.take() == []
+
+
 @pytest.mark.parametrize(("address", "message"), [
     ("ros2://a?rate=0", r"the rate is '0'; needs a number above 0"),
     ("ros2://a?rate=fast", r"the rate is 'fast'; needs"),

@@ -196,6 +196,26 @@ def test_only_lost_rows_are_computed_again(tmp_path: Path) -> None:
     assert sorted(folder.glob("*.parquet")) == there
 
 
+def test_a_row_that_was_computed_again_replaces_the_lost_one(tmp_path: Path) -> None:
+    """Also before the sweep ends, when both are in files."""
+    plan, folder = plan_of({"a": "10:30:3"}), tmp_path / "a.parquet"
+    files = RowFiles(plan, {}, folder, fresh=False)
+    for k, status in enumerate(("completed", "crashed", "completed")):
+        files.add(Row(k, status))
+    files.close()
+    again = RowFiles(plan, {}, folder, fresh=False)
+    again.add(Row(1, "completed", "", {"x": Measure(5.0, "m", "")}))
+    again.write()
+    assert len([*folder.glob("*.parquet")]) == 2
+    for closed in (False, True):
+        if closed:
+            again.close()
+        found = Sweep.load(folder)
+        assert found["run"].tolist() == [0, 1, 2]
+        assert found["status"].tolist() == ["completed"] * 3
+        assert found["x"][1] == 5.0
+
+
 def test_ctrl_c_while_a_file_is_written_leaves_no_part_of_it(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

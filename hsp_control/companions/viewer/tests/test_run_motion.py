@@ -5,7 +5,7 @@ import pinocchio as pin
 
 from hsp_control import Robot, Rollout
 from hsp_control.common.arrays import Array
-from hsp_control.companions.viewer.motion import motion_of
+from hsp_control.companions.viewer.motion import drawn_times, motion_of
 
 
 def turn(quaternion: Array) -> Array:
@@ -55,3 +55,14 @@ def test_frames_between_rows_are_on_the_geodesic(
     on_rows = np.isin(rows.t, t)
     np.testing.assert_array_equal(rows["half"][on_rows], half)
     assert np.isnan(rows["half"][~on_rows]).all()
+
+
+def test_the_end_replaces_a_row_that_is_too_close_before_it() -> None:
+    """First and last row are always drawn, and none within a finest step."""
+    for given, drawn in (
+        ([0.0, 0.004, 0.01, 0.02, 0.025], [0.0, 0.01, 0.025]),
+        ([0.0, 0.01, 0.02, 0.03], [0.0, 0.01, 0.02, 0.03]),
+        ([0.0, 0.003], [0.0, 0.003]),
+    ):
+        found = drawn_times(np.array(given), finest=0.01, coarsest=1.0)
+        assert found.tolist() == drawn

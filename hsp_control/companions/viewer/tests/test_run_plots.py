@@ -1,10 +1,12 @@
 """The plots of the live page: messages, their amount, and their receivers."""
 
+import numpy as np
 import pytest
 
 from hsp_control import Rollout, load_experiment
 from hsp_control.companions.viewer import ComparedRun, InlineView, SceneRecorder, Viewer
 from hsp_control.companions.viewer.commands import PLOTS, key_of, unpack
+from hsp_control.companions.viewer.live_plots import Curve
 from hsp_control.companions.viewer.page_plots import (
     PREVIEW_ROWS,
     plots_of,
@@ -63,3 +65,10 @@ def test_only_an_own_server_gets_them_and_a_notebook_never(computed) -> None:
         assert len(InlineView(recorder.scene).page) == pytest.approx(bare, rel=1e-3)
         viewer.play(log)  # a new stage has none, until they are sent again
         assert recorder.scene.get(key_of(PLOTS, "plots")) is None
+
+
+def test_a_share_of_a_limit_has_no_sign() -> None:
+    """The joint that is nearest to its limit, in either direction."""
+    curve = Curve("largest", "v", slice(0, 3), np.array([1.0, 2.0, np.inf]))
+    rows = {"t": np.arange(3.0), "v": np.array([[-0.9, 1.0, 9.0], [0.1, -1.0, -9.0]])}
+    np.testing.assert_allclose(curve.values(rows), [90.0, 50.0])

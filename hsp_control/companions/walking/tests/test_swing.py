@@ -1,5 +1,7 @@
 """Swing feet, footsteps and soles: continuity and constraints."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -11,7 +13,9 @@ from hsp_control.companions.walking.footsteps import (
     between,
     near,
 )
+from hsp_control.companions.walking.pendulum import DcmPhase
 from hsp_control.companions.walking.polygon import convex_hull, nearest_inside
+from hsp_control.companions.walking.push_recovery import PlannedSwing, PushRecovery
 from hsp_control.companions.walking.quintic import FootMotion, to_rest
 from hsp_control.companions.walking.step_adjustment import (
     WEIGHT_DCM,
@@ -204,3 +208,27 @@ def test_a_push_is_answered_by_place_and_where_that_ends_by_time():
     held = adjust(planned, 0.3, (0.1, 0.5), dcm_at, wanted, shift, least)
     assert held.target.y <= 0.12
     assert held.remaining < free.remaining < 0.3  # before it moves farther
+
+
+def test_a_step_that_was_adjusted_to_a_push_is_not_adjusted_again():
+    """Where the foot is sent now, the divergent component is as needed."""
+    walk, push = Walk(speed=0.3), np.array([0.0, 0.05])
+    recovery = PushRecovery(walk, STANCE, 3.3)
+    sole = np.array([0.1, 0.05])
+    feet = [
+        SimpleNamespace(place=place, reach=sole, place_of=lambda origin: origin)
+        for place in (Footstep(0.0, -0.085, 0.0), Footstep(-0.1, 0.085, 0.0))
+    ]
+    target, first = Footstep(0.2, 0.085, 0.0), np.array([0.0, -0.04])
+    phase = DcmPhase(walk.swing, np.array([-0.02, -0.085]), np.array([0.02, -0.085]))
+    since = 0.3 * walk.swing
+    wanted = phase.dcm(first, since, 3.3)
+    plan = PlannedSwing(1.0, *feet, target, phase, first, since, wanted, wanted + push)
+    level, start = np.eye(3), np.array([-0.1, 0.085, 0.0])
+    swing = Swing(0.0, walk.swing, start, level, target, level, 0.0, 0.05)
+    assert recovery.step(plan._replace(dcm=wanted), swing, since) is None
+    step = recovery.step(plan, swing, since)
+    assert step is not None
+    assert np.abs(step.target.point - target.point).max() > 0.01
+    swing.redirect(since, step.target, since + step.remaining)
+    assert recovery.step(plan, swing, since) is None

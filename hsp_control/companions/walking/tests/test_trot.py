@@ -1,6 +1,7 @@
 """Trots and crawls are values; mistakes are refused before a foot swings."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,6 +11,8 @@ from hsp_control import Limits, Robot, load_experiment
 from hsp_control.common.errors import HspControlError, PlanError
 from hsp_control.companions.walking import Crawl, Trot
 from hsp_control.companions.walking.contact_switch import Switch
+from hsp_control.companions.walking.footsteps import Velocity
+from hsp_control.companions.walking.four_feet import PointFoot
 from hsp_control.companions.walking.plan_composition import FRICTION
 from hsp_control.companions.walking.quadruped import BANDWIDTH
 from hsp_control.constraints.contacts import BallContact, SurfaceContact
@@ -112,3 +115,13 @@ def test_the_velocity_may_change_and_ends():
         Trot(velocity=Hold([0.1]))
     with pytest.raises(PlanError, match=r"contact_force is 0.25 robot weights; must"):
         Trot(contact_force=0.25)
+
+
+def test_the_body_turns_about_its_middle_above_a_foot():
+    """v + ω × r: on one side a turn adds to the way, on the other it subtracts."""
+    forward, left, turn = 0.3, -0.1, 0.5
+    for x, y in ((0.2, 0.1), (0.2, -0.1), (-0.2, 0.1), (-0.2, -0.1)):
+        foot = SimpleNamespace(offset=np.array([x, y]))
+        way = np.array([forward, left, 0.0]) + np.cross([0.0, 0.0, turn], [x, y, 0.0])
+        found = PointFoot.speed(foot, Velocity(forward, left, turn))
+        assert found == pytest.approx(np.linalg.norm(way), rel=1e-12)
