@@ -87,7 +87,12 @@ def _share(
 ) -> tuple[float, int]:
     """Return the least share of their largest speeds, and the joint that has it."""
     J = robot.state(0.0, q, np.zeros(robot.nv)).frame(frame).jacobian[rows]
-    limited = np.where(np.isfinite(limit), limit, 1e6)
+    # A joint without a limit is much faster than those with one, but not so much that
+    # `rcond` would take these for locked.
+    known = limit[np.isfinite(limit)]
+    if not known.size:
+        return 0.0, 0
+    limited = np.where(np.isfinite(limit), limit, 1e4 * known.max())
     scaled = J * limited  # of shares v/limit
     least = np.linalg.pinv(scaled, rcond=1e-9) @ rate
     if np.linalg.norm(scaled @ least - rate) > 1e-6 * np.linalg.norm(rate):

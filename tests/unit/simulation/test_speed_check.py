@@ -82,3 +82,12 @@ def test_joints_without_a_limit_may_be_as_fast_as_they_need() -> None:
     for limit in ([np.inf] * 3, [np.inf, np.inf, 0.1]):
         assert too_fast(robot, task, passed, np.array(limit)) is None
     assert too_fast(robot, task, passed, np.array([np.inf, 0.1, 0.1])) is not None
+
+
+def test_a_slow_joint_counts_beside_one_without_a_limit() -> None:
+    """It is a thousandth of a rad/s fast, and the line needs a hundred of them."""
+    robot = hsp.Robot.load("planar3r")
+    line = hsp.Line([0.0, 0.1], 1.0, start=[0.0, 0.0])
+    task = hsp.FramePosition("tip", line, axes="xy")
+    limit = np.array([np.inf, 1e-3, 1e-3])  # one joint alone cannot follow a line
+    assert too_fast(robot, task, [Passed(0.5, robot.home(), 0.0)], limit) is not None
