@@ -69,6 +69,12 @@ thorough: assertions sanitize ## run the tests with more seeds, every configurat
 	@HSP_THOROUGH=1 $(BIN)/python -m pytest $(SPREAD) $(ARGS)
 	@$(BIN)/python tools/mutants.py
 
+# OpenBLAS, NumPy and glibc choose their code by the processor.
+older: $(STAMP) $(ENGINE) ## `make test` as on an x86-64 without AVX and FMA
+	@OPENBLAS_CORETYPE=Nehalem NPY_DISABLE_CPU_FEATURES="X86_V3 X86_V4" \
+	  GLIBC_TUNABLES=glibc.cpu.hwcaps=-AVX512F,-AVX2,-AVX,-FMA \
+	  $(BIN)/python -m pytest $(SPREAD) -m "not system" $(ARGS)
+
 # What a library of the engine is built with, and the tests whose calls it then makes.
 CALLS ?= tests/unit/engine tests/unit/law tests/unit/edge tests/unit/tasks tests/unit/null_space \
   tests/unit/constraints tests/unit/trajectories tests/unit/geometry tests/unit/robot \
@@ -202,7 +208,7 @@ clean: ## remove caches, builds and the demo's output; .venv stays
 	@rm -rf build dist docs/_build docs/_static/replays docs/reference/generated out/demo .coverage .*_cache .hypothesis
 	@find hsp_control tests -name __pycache__ -prune -exec rm -rf {} +
 
-.PHONY: help assertions sanitize docs links figures animations example-pictures notebooks demo quick sims lerobot test test-system thorough lint coverage fuzz mutants wheel wheel-test release format constraints clean
+.PHONY: help assertions sanitize older docs links figures animations example-pictures notebooks demo quick sims lerobot test test-system thorough lint coverage fuzz mutants wheel wheel-test release format constraints clean
 
 # ------------------------------------------------------------------- the environment
 
