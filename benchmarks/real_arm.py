@@ -310,7 +310,8 @@ the rms change of an effort in a period; how many rest, with no joint faster tha
 
 Gains are those of each project: crisp_py's for a Franka, Isaac-Reach-Franka-OSC,
 robosuite's `osc_pose.json`, pink's example with Kp = 100 and Kv = 20 in joint space.
-TSID has the gains and weights of its UR5 exercise (Kp = 5).
+TSID has the gains and weights of its UR5 exercise: with Kp = 5 it is 88 mm late on the
+circle of an exact model, too.
 This law has its defaults (Kp = 100, Kv = 20, K_N = 10): without an observer, as it
 comes, with crisp's stiffness as its impedance, where the observer is off because a
 spring must yield, and with rotors in its model: 0.1 kg m² for each joint, a guess,
