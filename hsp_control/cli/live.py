@@ -10,7 +10,7 @@ from typing import Any
 
 from rich.table import Table
 
-from hsp_control.cli.consoles import out
+from hsp_control.cli.consoles import out, working
 from hsp_control.cli.live_experiment import (
     begun_where_it_is,
     check_live,
@@ -282,9 +282,10 @@ def _convert(journal: Path, followed: Path | None = None, **meta: Any) -> bool:
         rollout.meta.update(meta)
         if followed is not None:
             try:
-                rollout = with_tasks(
-                    rollout, Rollout.load(followed), load_experiment(followed)
-                )
+                with working(f"The robot's errors in {len(rollout)} rows"):
+                    rollout = with_tasks(
+                        rollout, Rollout.load(followed), load_experiment(followed)
+                    )
             except BaseException as error:  # of the user's own code, or Ctrl-C
                 unknown = described(error)
         log = rollout.save(journal.with_suffix(".npz"))

@@ -1,13 +1,14 @@
 """The robot's log has the tasks that the loop followed, of the robot's own states."""
 
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 import pytest
 
 import hsp_control as hsp
 from hsp_control import RobotState, Rollout
+from hsp_control.cli import live
 from hsp_control.cli.live_experiment import simulated_robot
 from hsp_control.cli.true_run import with_tasks
 from hsp_control.common.errors import LiveError
@@ -136,3 +137,28 @@ def test_a_log_of_states_is_summed_up_drawn_and_exported(tmp_path: Path) -> None
     shown = [each["title"] for each in packed["panels"]]
     assert shown == ["Joint positions", "Efforts τ"]
     hsp.viewer.export_html(log, tmp_path / "page.html")
+
+
+@pytest.mark.parametrize(
+    "raised", [ValueError("no"), KeyboardInterrupt(), SystemExit()]
+)
+def test_the_robot_s_log_is_kept_whatever_is_raised_while_it_is_completed(
+    raised: BaseException,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """By the user's own field, or by Ctrl-C in a long evaluation."""
+
+    def fail(*_: object) -> NoReturn:
+        raise raised
+
+    experiment = hsp.load_experiment(CONFIG, "simulation.duration=0.05")
+    loop = experiment.run().save(tmp_path / "loop.npz")
+    run = experiment.run(log=tmp_path / "robot.journal")
+    monkeypatch.setattr(live, "with_tasks", fail)
+    assert live._convert(tmp_path / "robot.journal", followed=loop)
+    kept = hsp.Rollout.load(tmp_path / "robot.npz")
+    np.testing.assert_array_equal(kept.q, run.q)
+    assert not (tmp_path / "robot.journal").exists()
+    assert f"has its states only: {type(raised).__name__}" in capsys.readouterr().out
