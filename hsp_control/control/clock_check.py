@@ -5,8 +5,8 @@ from hsp_control.common.warned import warn
 from hsp_control.robot import RobotState
 
 _FEW = 5
-"""Consecutive steps before a clock is reported: one may be late or repeated. A single
-step that is this many periods early suffices."""
+"""Consecutive steps, or steps back with others in between, before a clock is reported:
+one may be late or repeated. A single step that is this many periods early suffices."""
 _LATE = 1e6
 """A state later than eleven days has the time of a clock, not of a run [s]."""
 _STILL = 100
@@ -93,8 +93,8 @@ class ClockCheck:
             kind = "fast"
         elif passed * _UNITS < held:
             kind = "slow"
-        if kind == "":
-            self._count = 0
+        if kind == "":  # steps back in between still count: a clock has none
+            self._count = self._count if self._kind == "back" else 0
             return
         self._count = self._count + 1 if kind == self._kind else 1
         self._kind = kind

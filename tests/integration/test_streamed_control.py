@@ -145,6 +145,43 @@ def test_a_preview_does_not_affect_the_run() -> None:
     assert len(hand.record) == 1
 
 
+@pytest.mark.parametrize("command", ["target", "velocity", "send", "chunk"])
+def test_a_command_to_a_preview_is_the_preview_s_alone(command: str) -> None:
+    """It goes on with the original's messages until then, and the original with its."""
+    q, v, there = PANDA.home(), np.zeros(7), moved(hand_pose(PANDA), 0.2)
+
+    def begun() -> hsp.Controller:
+        made = hsp.Controller(PANDA, [hsp.FramePose("panda_tcp", hsp.StreamPose())])
+        made.compute(0.0, q, v)
+        made.stream("panda_tcp").send(there)
+        made.compute(PERIOD, q, v)
+        return made
+
+    def moves(made: hsp.Controller, first: int) -> list[bytes]:
+        steps = range(first, first + 100)
+        return [made.compute(PERIOD * k, q, v).tau.tobytes() for k in steps]
+
+    controller, alone = begun(), begun()
+    preview = controller.preview()
+    preview.compute(0.0, q, v)
+    aside = moved(there, -0.3)
+    match command:
+        case "target":
+            preview.set_target("panda_tcp", aside)
+        case "velocity":
+            preview.set_velocity("panda_tcp", [0.1, 0, 0, 0, 0, 0])
+        case "send":
+            preview.stream("panda_tcp").send(aside)
+        case "chunk":
+            values = [pin.SE3ToXYZQUAT(aside)]
+            preview.stream("panda_tcp").send_chunk(values, [0.1])
+    assert moves(controller, 2) == moves(alone, 2)
+    taken = preview.stream("panda_tcp").counts()["taken"]
+    moves(preview, 2)
+    assert preview.stream("panda_tcp").counts()["taken"] > taken
+    assert len(controller.stream("panda_tcp").record) == 1
+
+
 def test_the_reference_of_a_task_changes_to_a_stream_while_it_runs() -> None:
     circle = hsp.Circle(radius=0.05, angular_rate=2.0)
     controller = hsp.Controller(PANDA, [hsp.FramePosition("panda_tcp", circle)])

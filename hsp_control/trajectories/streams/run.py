@@ -29,7 +29,8 @@ class StreamRun:
     A controller stores the runs of its streams. A copy or a pickle continues from the
     present state, with the messages that wait, and receives the later ones to itself. A
     copy of a stream that listens to a source, and one with a `shared` queue, receives
-    the messages to this one, and leaves them there.
+    the messages to this one, and leaves them there; once it is sent to itself, only its
+    own.
 
     Attributes:
         declared: The declared stream; the next run begins with the untaken messages to
@@ -106,6 +107,10 @@ class StreamRun:
                 f"this stream receives from {self.stream.listens_to}; send needs a "
                 "stream without source and messages"
             )
+        if self._aside:  # a copy's own commands are not the original's
+            memo: dict[int, Any] = {}
+            self._inbox = deepcopy(self._inbox, memo)
+            self._reader, self._aside = deepcopy(self._reader, memo), False
         self._inbox.put(**message)
 
     def follow(self, before: "StreamRun") -> None:

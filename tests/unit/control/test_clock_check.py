@@ -40,6 +40,12 @@ STEPS = H * np.arange(40)
         (-STEPS, H, "... runs back: t = -0.01 s ... -0.002 s"),
         (np.zeros(200), H, "... stands still at t = 0 s"),
         (np.append(STEPS, STEPS), H, "... runs back: t = 0 s ... -0.078 s"),
+        # every second step, so that no two in a row run back
+        (
+            np.where(np.arange(40) % 2, STEPS - 3 * H, STEPS),
+            H,
+            "... runs back ... -0.004",
+        ),
     ],
 )
 def test_a_clock_of_something_else_is_reported_once(
