@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hsp_control.common.entry_points import own_names
-from hsp_control.common.errors import ControllerError
+from hsp_control.common.errors import ControllerError, HspControlError
 from hsp_control.common.keywords import suggesting_methods
 from hsp_control.common.suggestions import did_you_mean
 from hsp_control.constraints.contacts import CommandedForce
@@ -242,7 +242,15 @@ class TimeLine:
         before = _applied(earlier, self.settled)
         change = change.understood(before)
         placed = change.placed(here or self.start, before)
-        _checked(placed, before)
+        after = _checked(placed, before)
+        for later in (each for each in self.open if each.at > change.at):
+            try:
+                after = later.apply(after)
+            except HspControlError as error:
+                raise ControllerError(
+                    f"the {type(later).__name__} at t = {later.at:g} s would not fit "
+                    f"any more: {error.bare_message}"
+                ) from None
         opened = sorted((*self.open, placed), key=lambda each: each.at)
         if here is None:
             declared = (*self.declared, change)

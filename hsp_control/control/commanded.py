@@ -24,6 +24,7 @@ from hsp_control.control.targets import (
     new_stream,
     target_of,
 )
+from hsp_control.declaration.language import check_kind
 from hsp_control.tasks import Task
 from hsp_control.trajectories.crossfade import settled
 from hsp_control.trajectories.streams.followed import FollowedStream
@@ -165,15 +166,15 @@ class Commanded(Composition):
         """Send a message to a task's stream, which takes over if there is none yet."""
         present = self._followed(task)
         if followed_stream(present) is None:
+            reference: Any = new_stream(present.followed)
+            reference.check(getattr(present.followed, "dimension", None), **message)
+            self.at(self._state.t).ramp(RAMP).reference(task, reference)
             if source := listened_to(present):
                 warn(
                     f"task {task!r} follows {source} no longer: a command takes over; "
                     f"controller.at(t).reference({task!r}, stream) returns to it",
                     UserWarning,
                 )
-            reference: Any = new_stream(present.followed)
-            reference.check(getattr(present.followed, "dimension", None), **message)
-            self.at(self._state.t).ramp(RAMP).reference(task, reference)
         stream = self.stream(task)
         stream.send(**message)
         return stream
@@ -195,6 +196,7 @@ class Commanded(Composition):
             RateError: If a user-defined rate of a new part is wrong.
             HspControlError: If its parts do not fit the robot.
         """
+        check_kind("change is", change, Change, ControllerError)
         with self._lock:
             self._change(change)
             if self._memory.begun:  # when the objects of the change are freed

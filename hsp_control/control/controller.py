@@ -4,6 +4,7 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from contextlib import suppress
 from copy import deepcopy
 from math import inf, isfinite
+from numbers import Real
 from time import perf_counter
 
 import numpy as np
@@ -23,6 +24,7 @@ from hsp_control.control.first_state import (
     warn_of_far_targets,
     warn_of_jump,
 )
+from hsp_control.control.fitting import check_parts
 from hsp_control.control.mixture import AccelerationModifier
 from hsp_control.control.model_in_force import ModelInForce
 from hsp_control.control.output import ControlOutput, Diagnostics
@@ -314,8 +316,10 @@ class Controller(Commanded):
         Raises:
             NonFiniteError: If the origin is NaN or inf.
         """
-        if origin is not None and not isfinite(origin):
-            raise NonFiniteError(f"origin is {origin}; needs a finite number")
+        if origin is not None and not (
+            isinstance(origin, Real) and isfinite(float(origin))
+        ):
+            raise NonFiniteError(f"origin is {origin!r}; needs a finite number")
         with self._lock:
             now, memory = self._in_force, self._memory
             line = now.time_line
@@ -462,6 +466,7 @@ class Controller(Commanded):
         The state's time starts at the first step. The controller does not move: its
         copy does.
         """
+        check_kind("state is", state, RobotState, ControllerError)
         ahead = self._ahead()
         with ahead._lock:
             ahead._observe(state)
@@ -521,6 +526,8 @@ class Controller(Commanded):
             changes: All changes of the run, such as those of a log; None: those that
                 come in every run.
         """
+        if changes is not None:
+            check_parts("changes", changes, Change)
         other = self._copy()
         other.restart(origin=0.0)
         if changes is not None:

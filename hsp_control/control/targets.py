@@ -7,7 +7,7 @@ import numpy as np
 import pinocchio as pin
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.errors import ControllerError
+from hsp_control.common.errors import ControllerError, TrajectoryError
 from hsp_control.declaration.language import shortened
 from hsp_control.declaration.quantities import numbers
 from hsp_control.declaration.rotation import matrix_of
@@ -86,6 +86,14 @@ def target_of(task: Task, value: object, here: Callable[[], RobotState]) -> Arra
     Raises:
         ControllerError: If it is none of the task.
     """
+    try:
+        return _target_of(task, value, here)
+    except TrajectoryError as error:  # of a value that a target would hold
+        _, _, reason = error.bare_message.partition(": ")
+        raise ControllerError(f"a target of task {task.name!r}: {reason}") from None
+
+
+def _target_of(task: Task, value: object, here: Callable[[], RobotState]) -> Array:
     followed = task.followed
     if isinstance(task, Pointing):
         direction = numbers(value)

@@ -249,14 +249,19 @@ def explained(finding: Mistake, key: str = "key") -> str:
 
 
 def _holder(value: Any, expected: ValueTypes) -> str:
-    """Return where an unknown key would be right, if that is one level deeper."""
-    inside = [
-        key
-        for key in keys(expected)
-        for option in expected.options
-        if (inner := entry(option, key)) and value in keys(inner)
-    ]
-    names = [*dict.fromkeys(map(repr, inside))]
+    """Return where an unknown key would be right: in one value here, or its parts."""
+    found = []
+    for key in keys(expected):
+        for option in expected.options:
+            inner = entry(option, key)
+            if inner is None:
+                continue
+            parts = [entry(each, 0) for each in inner.options if not is_model(each)]
+            if value in keys(inner):
+                found.append(repr(key))
+            elif any(part and value in keys(part) for part in parts):
+                found.append(f"a part of {key!r}")
+    names = [*dict.fromkeys(found)]
     return f"; it belongs to {joined(names)}" if 0 < len(names) < 3 else ""
 
 

@@ -148,7 +148,8 @@ class StreamRun:
         if source is not None:
             messages = read_recording(Path(source))
         if messages is not None:
-            taken = recorded(messages, self._space)
+            where = "" if source is None else source
+            taken = recorded(messages, self._space, where)
             return Reader(Inbox.recorded(self._space, taken), aside=True)
         return Reader(self._inbox, aside=self._aside)
 

@@ -88,7 +88,9 @@ def kind_of(source: str) -> AddressKind:
 LARGEST_FILE = 100_000_000  # maximum size of a recording [bytes]
 
 
-def recorded(data: Sequence[Mapping[str, Any]], space: Space) -> list[Message]:
+def recorded(
+    data: Sequence[Mapping[str, Any]], space: Space, file: str = ""
+) -> list[Message]:
     """Return the messages of a recording, with their times ``at``."""
     messages: list[Message] = []
     for k, each in enumerate(data):
@@ -102,7 +104,8 @@ def recorded(data: Sequence[Mapping[str, Any]], space: Space) -> list[Message]:
             messages.append(message_of(rest, space))
             messages[-1].times[:, 2] = at
         except StreamError as error:
-            raise StreamError(f"message {k} of the recording: {error}") from None
+            place = f"{file}: " if file else ""
+            raise StreamError(f"{place}message {k} of the recording: {error}") from None
     return messages
 
 

@@ -93,6 +93,9 @@ MISTAKES: list[tuple[dict[str, Any], str, str]] = [
     ({"obstacles": {"a": {"shape": BOX, "center": HOLD}}}, "ConfigError",
      "obstacles: unknown ... belongs to 'scene'"),
     ({"duration": 3}, "ConfigError", "duration: unknown ... belongs to 'simulation'"),
+    ({"blend": 1}, "ConfigError", "blend: unknown ... belongs to a part of 'tasks'"),
+    ({"null_space": {"weight": 2}}, "ConfigError",
+     "null_space.weight: unknown ... belongs to a part of 'fields'"),
     (task(kp=100), "ConfigError", "tasks.hand.kp: unknown ... belongs to 'gains'"),
     # values
     (task(gains={"kp": [1, [2]], "kv": 1}), "ConfigError",

@@ -12,6 +12,7 @@ from hsp_control.common.errors import (
     ControllerError,
     GainError,
     LiveError,
+    NonFiniteError,
     SimulationError,
     StreamError,
 )
@@ -23,6 +24,10 @@ Made = Callable[[hsp.Controller], Any]
 def controller(**options: Any) -> hsp.Controller:
     task = hsp.FramePosition("panda_hand", hsp.Stream())
     return hsp.Controller(hsp.Robot.load("panda"), [task], **options)
+
+
+def turned() -> hsp.Controller:
+    return hsp.Controller(hsp.Robot.load("panda"), [hsp.FramePose("panda_hand")])
 
 
 def still(c: hsp.Controller) -> InProcessRobot:
@@ -60,6 +65,20 @@ def still(c: hsp.Controller) -> InProcessRobot:
     (lambda c: c.at(1).reference(
         "panda_hand", hsp.Stream(messages=[{"at": 0, "value": [1, 2]}])),
      StreamError, r"^trajectory: message 0 of the recording: value has 2 .* needs 3"),
+    (lambda c: c.change("gravity"), ControllerError, "change is 'gravity'.*ChangeGrav"),
+    (lambda c: c.change(hsp.changes.ChangeGravity),
+     ControllerError, "change is ChangeGravity, a class"),
+    (lambda c: c.preview(["x"]), ControllerError, "changes contains 'x'"),
+    (lambda c: c.restart(origin="now"), NonFiniteError, "origin is 'now'"),
+    (lambda c: c.prepare(lifted=["foot"]), ControllerError, "no contact 'foot'"),
+    (lambda c: c.prepare(without=["panda_hnad"]),
+     ControllerError, "no task 'panda_hnad'; did you mean 'panda_hand'"),
+    (lambda c: c.stack_at(c.robot.home()), ControllerError, "needs a RobotState"),
+    (lambda c: c.at(0.9).gains("panda_hand", hsp.Gains(natural_frequency=9.0))
+        and c.at(0.5).remove("panda_hand"),
+     ControllerError, "ChangeGains at t = 0.9 s would not fit .*'panda_hand'"),
+    (lambda c: turned().set_target("panda_hand", [0.4, 0, 0.5, 2, 0, 0, 0]),
+     ControllerError, "^a target of task 'panda_hand': rotation: .* norm 1; it has 2"),
 ])  # fmt: skip
 def test_it_is_named(mistake: Made, error: type[Exception], message: str) -> None:
     with pytest.raises(error, match=message):
@@ -96,6 +115,10 @@ def test_a_command_that_ends_a_source_says_so() -> None:
     robot = hsp.Robot.load("panda")
     made = hsp.Controller(robot, [hsp.FramePosition("panda_hand", listening)])
     made.compute(0.0, robot.home(), np.zeros(7))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")  # nothing is taken over by what is refused
+        with pytest.raises(StreamError, match="velocity has 2 numbers"):
+            made.set_velocity("panda_hand", [0.1, 0.0])
     with pytest.warns(UserWarning, match=r"'panda_hand' follows a recording no longer"):
         made.set_target("panda_hand", [0.4, 0.0, 0.5])
     with warnings.catch_warnings():
