@@ -94,7 +94,10 @@ def tests_of(file: str) -> tuple[str, ...]:
 
 
 def sources(place: str, since: str | None) -> list[str]:
-    """Return the files to break: below a place, and changed since a commit if given."""
+    """Return the files to break: below a place, and changed since a commit if given.
+
+    Tests and benchmarks of companions are no code of a user's.
+    """
     command = ["git", "ls-files", place]
     if since:
         command = ["git", "diff", "--name-only", "--diff-filter=d", since, "--", place]
@@ -104,7 +107,9 @@ def sources(place: str, since: str | None) -> list[str]:
     return [
         file
         for file in listed
-        if file.startswith(CODE) and file.endswith((".py", ".hpp", ".cpp"))
+        if file.startswith(CODE)
+        and file.endswith((".py", ".hpp", ".cpp"))
+        and not {"tests", "benchmark"} & {*file.split("/")}
     ]
 
 

@@ -164,3 +164,9 @@ def test_endless_or_memory_hungry_mutants_are_caught(
     monkeypatch.setattr(mutants, "LONGEST", 5.0)
     (checkout / "code_under_test.py").write_text(f"def area(a, b):\n    {wrong}\n")
     assert mutants.run(checkout, ["test_area.py"]) == Verdict("caught", detail)
+
+
+def test_tests_and_benchmarks_of_companions_are_not_broken() -> None:
+    files = mutants.sources("hsp_control/companions", None)
+    assert "hsp_control/companions/viewer/page_plots.py" in files
+    assert not [file for file in files if "/tests/" in file or "/benchmark/" in file]
