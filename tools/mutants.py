@@ -29,7 +29,10 @@ from mutations import Edit, edits
 
 ROOT = Path(__file__).resolve().parents[1]
 CODE = ("hsp_control", "engine")
-COPIED = (*CODE, "conftest.py", "tests", "robots", "configs", "docs", "pyproject.toml")
+COPIED = (
+    *(*CODE, "conftest.py", "tests", "tools", "robots", "configs", "docs"),
+    *("README.md", "pyproject.toml"),
+)
 TESTS_FAILED = 1
 """The exit status of pytest when tests ran and one failed."""
 LONGEST, MEMORY = 900.0, 16 << 30
@@ -169,8 +172,9 @@ def tried(copy: Path, mutants: Sequence[Mutant]) -> Iterator[tuple[Mutant, Verdi
     sound: dict[tuple[str, ...], Verdict] = {}
     for number, mutant in enumerate(mutants, start=1):
         start = perf_counter()
-        if mutant.tests not in sound:
-            sound[mutant.tests] = run(copy, mutant.tests)
+        for tests in (mutant.tests, FAST):
+            if tests not in sound:
+                sound[tests] = run(copy, tests)
         file = copy / mutant.file
         text = file.read_text(encoding="utf-8")
         file.write_text(mutant.edit.applied(text), encoding="utf-8")
@@ -180,8 +184,10 @@ def tried(copy: Path, mutants: Sequence[Mutant]) -> Iterator[tuple[Mutant, Verdi
             if verdict.word == "SURVIVED" and mutant.tests != FAST:
                 verdict = run(copy, FAST)
         file.write_text(text, encoding="utf-8")
-        if sound[mutant.tests].word != "SURVIVED":
-            verdict = Verdict("void", "its tests do not pass without the edit")
+        for tests in (mutant.tests, FAST):
+            if sound[tests].word != "SURVIVED":
+                why = f"{sound[tests].detail} without the edit, too"
+                verdict = Verdict("void", why)
         print(
             f"{number:3d}/{len(mutants)} {verdict.word:9} {mutant} "
             f"{perf_counter() - start:4.0f} s  {verdict.detail}",

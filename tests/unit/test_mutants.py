@@ -147,7 +147,20 @@ def test_tests_that_fail_anyway_catch_nothing(checkout: Path) -> None:
     (checkout / "test_area.py").write_text(TESTS.replace("6.0", "7.0"))
     edit = mutant("a * b", "0.5 * a * b", "test_area.py")
     ((_, verdict),) = mutants.tried(checkout, [edit])
-    assert verdict == ("void", "its tests do not pass without the edit")
+    assert verdict == ("void", "FAILED test_area.py::test_area without the edit, too")
+
+
+@pytest.mark.process
+def test_fast_tests_that_fail_anyway_catch_nothing_either(
+    checkout: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What the room's tests do not see would be caught by any error of the others."""
+    (checkout / "test_other.py").write_text("import not_copied\n")
+    monkeypatch.setattr(mutants, "FAST", ("test_other.py",))
+    edit = mutant("a + b", "a - b", "test_area.py")
+    ((_, verdict),) = mutants.tried(checkout, [edit])
+    assert verdict.word == "void"
+    assert "without the edit, too" in verdict.detail
 
 
 @pytest.mark.process
@@ -166,6 +179,7 @@ def test_endless_or_memory_hungry_mutants_are_caught(
     assert mutants.run(checkout, ["test_area.py"]) == Verdict("caught", detail)
 
 
+@pytest.mark.skipif(not (ROOT / ".git").exists(), reason="no checkout: a copy")
 def test_tests_and_benchmarks_of_companions_are_not_broken() -> None:
     files = mutants.sources("hsp_control/companions", None)
     assert "hsp_control/companions/viewer/page_plots.py" in files
