@@ -29,10 +29,8 @@ from mutations import Edit, edits
 
 ROOT = Path(__file__).resolve().parents[1]
 CODE = ("hsp_control", "engine")
-COPIED = (
-    *(*CODE, "conftest.py", "tests", "tools", "robots", "configs", "docs"),
-    *("README.md", "pyproject.toml"),
-)
+LEFT_OUT = (".git", ".venv*", "build", "out", "dist", "_build", "__pycache__")
+"""Files and folders of the checkout that no test needs, in every folder."""
 TESTS_FAILED = 1
 """The exit status of pytest when tests ran and one failed."""
 LONGEST, MEMORY = 900.0, 16 << 30
@@ -151,11 +149,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     print(f"{len(mutants)} mutants, --seed {options.seed}", flush=True)
     with tempfile.TemporaryDirectory() as folder:
         copy = Path(folder) / "checkout"
-        copy.mkdir()
-        for name in (*COPIED, "hatch_build.py"):
-            (shutil.copytree if (ROOT / name).is_dir() else shutil.copy)(
-                ROOT / name, copy / name
-            )
+        shutil.copytree(ROOT, copy, ignore=shutil.ignore_patterns(*LEFT_OUT))
         found = list(tried(copy, mutants))
     caught = sum(verdict.word == "caught" for _, verdict in found)
     tests = sum(verdict.word != "void" for _, verdict in found)
