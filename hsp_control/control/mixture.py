@@ -13,7 +13,6 @@ import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.errors import ControllerError
-from hsp_control.common.suggestions import did_you_mean, listing
 from hsp_control.control.active_stack import ActiveStack
 from hsp_control.control.actuation import Actuation, Delivered, Status
 from hsp_control.control.actuation.limits_in_force import LimitSet, LimitsInForce
@@ -302,16 +301,10 @@ class Mixture:
     ) -> ActiveStack:
         """Return the stack without the contacts and tasks of some names."""
         contacts = self._setup.contacts
-        for kind, names, known in (
-            ("contact", lifted, [each.contact.name for each in contacts]),
-            ("task", without, [each.task.name for each in self._setup.tasks]),
-        ):
-            for name in names:
-                if name not in known:
-                    raise ControllerError(
-                        f"there is no {kind} {name!r}{did_you_mean(name, known)} "
-                        f"(there are {listing(known) or 'none'})"
-                    )
+        for name in lifted:  # raises if there is none
+            self._setup.contact(name)
+        for name in without:
+            self._setup.task(name)
         standing = [each for each in contacts if each.contact.name not in lifted]
         tasks = (each for level in self.levels for each in level)
         off = {each.key for each in tasks if each.task.name in without}
