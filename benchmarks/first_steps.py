@@ -6,7 +6,9 @@ Each change is made in fresh processes while the controller moves its own model 
 1 kHz, without Python's garbage collector, as in a live loop. CPU time of `compute` and
 `applied`: a step before the change; the most expensive one of the first after the call,
 the first of the ramp and the two after its end; the minimum over the processes, since
-others disturb. Writes a table into benchmarks/results/first_steps.md.
+others disturb. Where another thread sends a message, the loop waits for that thread
+before each step: a step after a wait is slower, with and without a message. Writes a
+table into benchmarks/results/first_steps.md.
 """
 
 import argparse
@@ -50,14 +52,15 @@ class Sender(Thread):
         self.start()
 
     def send(self, target: Any) -> None:
-        """Let the thread send a target, and wait until it has."""
+        """Let the thread send a target, or nothing, and wait until it has."""
         self._queue.put(target)
         self._queue.join()
 
     def run(self) -> None:
         """Send."""
         while True:
-            self._send(self._queue.get())
+            if (target := self._queue.get()) is not None:
+                self._send(target)
             self._queue.task_done()
 
 
@@ -165,6 +168,8 @@ def measured(name: str, kind: str) -> tuple[float, float]:
         for k in range(1000):
             if k % 50 == 49 and kind.startswith("later"):
                 sender.send(here(run.controller))
+            elif kind.endswith("another thread"):
+                sender.send(None)  # steps before it wait for the thread, too
             run.step()
     free, call = median(run.times[-100:]), len(run.times)
     if kind.endswith("another thread"):

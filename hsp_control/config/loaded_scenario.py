@@ -18,7 +18,7 @@ from hsp_control.config.streams import with_messages
 from hsp_control.declaration import Part, within
 from hsp_control.declaration.located import locate
 from hsp_control.declaration.mistakes import Mistake, domain_error, explained, findings
-from hsp_control.declaration.schema import shape
+from hsp_control.declaration.schema import ValueTypes, shape
 from hsp_control.geometry.scene import Obstacle, Scene
 from hsp_control.geometry.shapes import Mesh
 from hsp_control.robot import Robot
@@ -121,7 +121,8 @@ def validate(document: Document, part: type[Value]) -> Value:
         except ValidationError as error:
             pending = [(each["loc"], each) for each in error.errors(include_url=False)]
             found = findings(document, shape(part), pending)
-        raise _summary(document, sorted(found, key=lambda f: _order(document, f)))
+        found.sort(key=lambda finding: _order(document, finding))
+        raise _summary([_error(document, each, shape(part)) for each in found])
 
 
 def _order(document: Document, finding: Mistake) -> tuple[bool, tuple[int, ...]]:
@@ -130,11 +131,11 @@ def _order(document: Document, finding: Mistake) -> tuple[bool, tuple[int, ...]]
     return mark is None, tuple(mark or ())
 
 
-def _error(document: Document, finding: Mistake) -> HspControlError:
+def _error(document: Document, finding: Mistake, root: ValueTypes) -> HspControlError:
     """Return the error of a finding; one that a part raised keeps its class."""
     own = domain_error(finding.error)
     if own is None:
-        message, (*holder, key) = explained(finding), finding.path or ("",)
+        message, (*holder, key) = explained(finding, root), finding.path or ("",)
         if finding.kind == "union_tag_not_found" and isinstance(key, str):
             beside = reduce(getitem, holder, document.to_dict())  # type: ignore[arg-type]
             message += did_you_mean(key, [name for name in beside if name != key])
@@ -145,8 +146,7 @@ def _error(document: Document, finding: Mistake) -> HspControlError:
     return error
 
 
-def _summary(document: Document, found: list[Mistake]) -> HspControlError:
-    errors = [_error(document, finding) for finding in found]
+def _summary(errors: list[HspControlError]) -> HspControlError:
     messages = list(dict.fromkeys(str(error) for error in errors))
     first, others = errors[0], messages[1:]
     if others:

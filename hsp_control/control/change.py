@@ -16,7 +16,9 @@ from hsp_control.constraints.limits import LimitsOrNone, RobotLimits
 from hsp_control.control.evolution import ABSENT
 from hsp_control.control.fitting import check_tasks, checked_gain
 from hsp_control.control.planned import (
+    PlannedContact,
     PlannedLimits,
+    PlannedTask,
     PlannedTerm,
     planned_task,
     planned_terms,
@@ -92,7 +94,7 @@ class ChangeContact(Change, type="contact"):
 
     def apply(self, setup: Setup) -> Setup:
         """Return the setup with the contact; see `Change.apply`."""
-        planned = setup.contact(self.contact)
+        planned = _contact(setup, self.contact)
         presence = planned.presence.then(self.at, self.ramp, float(self.active))
         return setup.with_contact(planned, presence=presence)
 
@@ -107,13 +109,13 @@ class ChangeForce(Change, type="force"):
 
     def placed(self, start: Start, setup: Setup) -> Self:
         """Return the change, checked where the robot is."""
-        contact = setup.contact(self.contact).contact
+        contact = _contact(setup, self.contact).contact
         replace(contact, force=self.force).placed(start)
         return self
 
     def apply(self, setup: Setup) -> Setup:
         """Return the setup with the force; see `Change.apply`."""
-        planned = setup.contact(self.contact)
+        planned = _contact(setup, self.contact)
         contact = planned.contact
         old, new = contact.force, self.force
         with within("force"):
@@ -207,18 +209,34 @@ class ExchangeField(Change, type="exchange_field"):
         return _with_field(setup, k, new, self)
 
 
+def _task(setup: Setup, name: str) -> PlannedTask:
+    """Return the task of a name; an error is at the change's key ``task``."""
+    with within("task"):
+        return setup.task(name)
+
+
+def _contact(setup: Setup, name: str) -> PlannedContact:
+    """Return the contact of a name; an error is at the change's key ``contact``."""
+    with within("contact"):
+        return setup.contact(name)
+
+
 def _find_field(setup: Setup, name: str) -> int:
-    """Return the index of the term with a name that is not being removed."""
+    """Return the index of the term with a name that is not being removed.
+
+    An error is at the change's key ``field``.
+    """
     there = {
         each.field.name: k
         for k, each in enumerate(setup.terms)
         if each.presence.target > 0.0
     }
     if name not in there:
-        raise ControllerError(
-            f"there is no field {name!r}{did_you_mean(name, there)} "
-            f"(there are {listing(there) or 'none'})"
-        )
+        with within("field"):
+            raise ControllerError(
+                f"there is no field {name!r}{did_you_mean(name, there)} "
+                f"(there are {listing(there) or 'none'})"
+            )
     return there[name]
 
 
@@ -260,7 +278,7 @@ class RemoveTask(Change, type="remove_task"):
 
     def apply(self, setup: Setup) -> Setup:
         """Return the setup without the task; see `Change.apply`."""
-        planned = setup.task(self.task)
+        planned = _task(setup, self.task)
         gone = planned.presence.then(self.at, self.ramp, 0.0)
         return setup.with_task(planned, presence=gone)
 
@@ -275,7 +293,7 @@ class ChangeGains(Change, type="gains"):
 
     def apply(self, setup: Setup) -> Setup:
         """Return the setup with the gains; see `Change.apply`."""
-        planned = setup.task(self.task)
+        planned = _task(setup, self.task)
         if planned.task.order != 2:
             raise ControllerError(
                 f"task {self.task!r} has no gains: its error equation is of first order"
@@ -306,14 +324,14 @@ class ChangeImpedance(Change, type="impedance"):
 
     def placed(self, start: Start, setup: Setup) -> Self:
         """Return the change with the spring's largest force in numbers."""
-        task = setup.task(self.task).task
+        task = _task(setup, self.task).task
         with within("impedance"):
             impedance = self.impedance.placed(task.error_parts, start.state.robot)
         return replace(self, impedance=impedance)
 
     def apply(self, setup: Setup) -> Setup:
         """Return the setup with the impedance; see `Change.apply`."""
-        planned = setup.task(self.task)
+        planned = _task(setup, self.task)
         if impedance_of(planned.task) is None:
             raise ControllerError(
                 f"task {self.task!r} has no impedance from the start, so none can "
@@ -344,21 +362,21 @@ class ChangeReference(Change, type="reference"):
         """Return the change with a stream of the task's kind: YAML has one word."""
         if not isinstance(self.trajectory, Streamed):
             return self
-        followed = setup.task(self.task).task.followed
+        followed = _task(setup, self.task).task.followed
         with within("trajectory"):
             stream = stream_for(followed, self.trajectory)
         return self if stream is self.trajectory else replace(self, trajectory=stream)
 
     def placed(self, start: Start, setup: Setup) -> Self:
         """Return the change with its trajectory in the world."""
-        task = setup.task(self.task).task
+        task = _task(setup, self.task).task
         followed = task.following(self.trajectory).placed(start).followed
         assert followed is not None
         return replace(self, trajectory=followed)
 
     def apply(self, setup: Setup) -> Setup:
         """Return the setup with the trajectory; see `Change.apply`."""
-        planned = setup.task(self.task)
+        planned = _task(setup, self.task)
         task = planned.task
         assert task.followed is not None
         changed = crossfade(

@@ -138,7 +138,7 @@ def _told(value: object) -> str:
 
 def _call(kind: type[Any]) -> str:
     """Return a class; of a part that is alone in its family, its constructor."""
-    name = _with_article(kind.__name__)
+    name = "None" if kind is type(None) else _with_article(kind.__name__)
     if not issubclass(kind, Declared) or kind.family is not None:
         return name
     return f"{name}({listing((each.name for each in value_fields(kind)), 6)})"

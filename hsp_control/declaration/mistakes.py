@@ -10,6 +10,7 @@ import dataclasses
 import re
 from collections import defaultdict
 from collections.abc import Collection, Iterable, Mapping, Sequence
+from itertools import accumulate, islice
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol, TypeAlias, get_args, get_origin
 
@@ -21,6 +22,7 @@ from hsp_control.common.suggestions import did_you_mean, listing, nearest
 from hsp_control.declaration.families import Declared
 from hsp_control.declaration.language import joined, kind, misfit, shown, spoken
 from hsp_control.declaration.located import KeyPath, written
+from hsp_control.declaration.misplaced import home_of, inside
 from hsp_control.declaration.plain_data import plain_data
 from hsp_control.declaration.schema import (
     ValueTypes,
@@ -209,18 +211,24 @@ _ENTRIES = ("entry", "entries")
 _LONG_LIST = 40
 
 
-def explained(finding: Mistake, key: str = "key") -> str:
+def explained(finding: Mistake, root: ValueTypes, key: str = "key") -> str:
     """Return the message for a finding, without its location.
 
-    A missing or unknown name is called ``key``.
+    Args:
+        finding: The mistake.
+        root: What the value may be that its path begins in.
+        key: The word for a name that is missing or unknown.
     """
     value, expected = finding.value, finding.expected
     match finding.kind:
         case "mismatch" if words := joined(_words(expected)):
             return _mismatch(value, words, expected)
         case "extra_forbidden":
-            holder = _holder(value, expected)
-            return f"unknown {key} {_unknown(value, keys(expected), holder)}"
+            *holder, unknown = finding.path
+            above = accumulate(holder, inside, initial=root)
+            levels = [*islice(above, len(holder)), expected]
+            home = home_of(str(unknown), tuple(holder), levels)
+            return f"unknown {key} {_unknown(value, keys(expected), home)}"
         case "missing":
             return _missing(key, value, keys(expected, required=True))
         case "union_tag_invalid" if tag := expected.discriminator:
@@ -248,26 +256,9 @@ def explained(finding: Mistake, key: str = "key") -> str:
     return _message_of_pydantic(finding)
 
 
-def _holder(value: Any, expected: ValueTypes) -> str:
-    """Return where an unknown key would be right: in one value here, or its parts."""
-    found = []
-    for key in keys(expected):
-        for option in expected.options:
-            inner = entry(option, key)
-            if inner is None:
-                continue
-            parts = [entry(each, 0) for each in inner.options if not is_model(each)]
-            if value in keys(inner):
-                found.append(repr(key))
-            elif any(part and value in keys(part) for part in parts):
-                found.append(f"a part of {key!r}")
-    names = [*dict.fromkeys(found)]
-    return f"; it belongs to {joined(names)}" if 0 < len(names) < 3 else ""
-
-
-def _unknown(value: Any, options: Iterable[Any], holder: str = "") -> str:
+def _unknown(value: Any, options: Iterable[Any], home: str = "") -> str:
     allowed = [str(option) for option in options]
-    near = holder or _near(value, allowed)
+    near = home or _near(value, allowed)
     among = f" (allowed: {listing(allowed, _LONG_LIST)})" if allowed else ""
     return f"{shown(value)}{near}{among}"
 
@@ -435,19 +426,20 @@ def as_error(finding: Mistake, cls: type[Declared]) -> HspControlError:
     kind = cls.error if own is None else type(own)
     own_argument = finding.kind == "missing" and not finding.path
     if own_argument or (finding.kind == "extra_forbidden" and len(finding.path) == 1):
-        return kind(f"{where}: {explained(finding, 'argument')}")
-    return kind(f"{where}: {_in_python(finding) or explained(finding)}")
+        return kind(f"{where}: {explained(finding, shape(cls), 'argument')}")
+    return kind(f"{where}: {_in_python(finding) or explained(finding, shape(cls))}")
 
 
 def _in_python(finding: Mistake) -> str:
     """Return the message where Python gave something that is no part; or nothing."""
     options = finding.expected.options
-    wanted = all(isinstance(o, type) and issubclass(o, Declared) for o in options)
+    parts = [o for o in options if isinstance(o, type) and issubclass(o, Declared)]
+    nothing = literals(options) == ["none"]  # which is None in Python
     known = finding.kind in ("mismatch", "union_tag_not_found")
-    if not (wanted and known and options):
+    if not (known and parts and len(parts) + nothing == len(options)):
         return ""
-    bases = [each.family.base if each.family else each for each in options]
-    return misfit(finding.value, [*dict.fromkeys(bases)])
+    bases = [each.family.base if each.family else each for each in parts]
+    return misfit(finding.value, [*dict.fromkeys(bases), *[type(None)] * nothing])
 
 
 class Carrier(ValueError):

@@ -93,10 +93,19 @@ MISTAKES: list[tuple[dict[str, Any], str, str]] = [
     ({"obstacles": {"a": {"shape": BOX, "center": HOLD}}}, "ConfigError",
      "obstacles: unknown ... belongs to 'scene'"),
     ({"duration": 3}, "ConfigError", "duration: unknown ... belongs to 'simulation'"),
-    ({"blend": 1}, "ConfigError", "blend: unknown ... belongs to a part of 'tasks'"),
+    ({"blend": 1}, "ConfigError", "blend: unknown ... belongs to 'tasks.*' or"),
     ({"null_space": {"weight": 2}}, "ConfigError",
-     "null_space.weight: unknown ... belongs to a part of 'fields'"),
-    (task(kp=100), "ConfigError", "tasks.hand.kp: unknown ... belongs to 'gains'"),
+     "null_space.weight: unknown ... belongs to 'null_space.fields.*' or"),
+    (task(kp=100), "ConfigError",
+     "tasks.hand.kp: unknown ... belongs to 'tasks.hand.gains'"),
+    (task(metric="mass_matrix"), "ConfigError",
+     "tasks.hand.metric: ... belongs to 'null_space'"),
+    (task(gains={"kp": 1, "kv": 1, "blend": 2}), "ConfigError",
+     "tasks.hand.gains.blend: unknown ... belongs beside 'gains'"),
+    ({"kp": 100}, "ConfigError", "kp: unknown ... to 'tasks.*.gains' or to 'changes"),
+    ({"simulation": {"limits": {}}}, "ConfigError",
+     "simulation.limits: ... belongs beside 'simulation' or"),
+    ({"radius": 1}, "ConfigError", "radius: unknown key 'radius' (allowed"),
     # values
     (task(gains={"kp": [1, [2]], "kv": 1}), "ConfigError",
      "tasks.hand.gains.kp.1: [2] ... a number"),
@@ -109,7 +118,7 @@ MISTAKES: list[tuple[dict[str, Any], str, str]] = [
      "scene.obstacles.a.orientation: axis ... non-zero ... [0, 0, 0]"),
     # changes
     (change(type="gains", task="hnd", gains=GAINS), "ControllerError",
-     "changes.0: there is no ... 'hnd' ... 'hand'"),
+     "changes.0.task: there is no ... 'hnd' ... 'hand'"),
     (change(type="gains", task="hand", gains={"kp": [1, 1], "kv": 1}), "GainError",
      "changes.0.gains: kp ... (2,) ... a number"),
     (change(type="add_task", task={"type": "pointing", "frame": "panda_hnd",
@@ -124,15 +133,15 @@ MISTAKES: list[tuple[dict[str, Any], str, str]] = [
     (change(type="null_space_gain", gain=[1, 2]), "GainError",
      "changes.0.gain: null_space_gain ... (2,) ... a number"),
     (change(type="contact", contact="a", active=True), "ControllerError",
-     "changes.0: there is no contact 'a'"),
+     "changes.0.contact: there is no contact 'a'"),
     ({"changes": [
         {"type": "remove_task", "task": "hand", "at": 2},
         {"type": "gains", "task": "hand", "gains": GAINS, "at": 3},
-     ]}, "ControllerError", "changes.1: there is no task 'hand'"),
+     ]}, "ControllerError", "changes.1.task: there is no task 'hand'"),
     ({"changes": [
         {"type": "gains", "task": "hand", "gains": GAINS, "at": 3},
         {"type": "remove_task", "task": "hand", "at": 2},
-     ]}, "ControllerError", "changes.0: there is no task 'hand'"),
+     ]}, "ControllerError", "changes.0.task: there is no task 'hand'"),
 ]  # fmt: skip
 
 
