@@ -104,7 +104,7 @@ class Commanded(Composition):
         Unless the steps are those of another thread: it would have to wait, and its
         processor's caches are others.
         """
-        self._memory.clock.look_again()  # it will move
+        self._memory.motion.look_again()
         if self._memory.begun and self._lock.was_mine:
             with self._lock:
                 self._rehearse(1)
@@ -206,6 +206,7 @@ class Commanded(Composition):
         here, now, given = None, self._in_force.latest, change
         begun = self._memory.begun
         self._memory.clock.change(change.at, max(now, 0.0))
+        self._memory.motion.look_again()
         if begun:
             change = replace(change, at=max(change.at, now))
             here = self._here()

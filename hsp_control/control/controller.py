@@ -104,6 +104,7 @@ class Controller(Commanded):
         if step is None or modifier is not None or q is None or v is None:
             self._observe(t, q, v)  # the state
             self._advance()  # values in force at its time
+            t = self._state.t if isinstance(t, RobotState) else t
         else:
             delivered = step.make(t, q, v)  # type: ignore[arg-type]
             stack, damped = step.active, step.damped
@@ -119,8 +120,12 @@ class Controller(Commanded):
         output = ControlOutput(delivered, stack, damped, now.limits.measured)
         if now.later is not None:
             now.passed(self._state.t)
-        if self._memory.clock.undecided:
-            self._memory.clock.moved(self._state)
+        motion = self._memory.motion
+        if t <= motion.latest:  # type: ignore[operator]
+            motion.returned(t)  # type: ignore[arg-type]
+        motion.latest = t  # type: ignore[assignment]
+        if motion.undecided and (wrong := motion.compare(self._state)):
+            self._memory.clock.tell(wrong)
         return output
 
     def _rehearse(self, times: int) -> None:

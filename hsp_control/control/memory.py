@@ -12,6 +12,7 @@ from hsp_control.common.arrays import Array
 from hsp_control.control.actuation.sent_effort import SentMemory
 from hsp_control.control.change import Change
 from hsp_control.control.clock_check import ClockCheck
+from hsp_control.control.clock_motion import ClockMotion
 from hsp_control.trajectories.streams.run import StreamRun
 
 
@@ -48,6 +49,7 @@ class RunMemory:
     forces: dict[str, Array] = field(default_factory=dict)
     streams: tuple[StreamRun, ...] = ()  # of present and later references
     clock: ClockCheck = field(default_factory=ClockCheck)
+    motion: ClockMotion = field(default_factory=ClockMotion)
     runs: int = 0  # how many times it was cleared
 
     @classmethod
@@ -67,19 +69,22 @@ class RunMemory:
         self.waiting.clear()
         for offset in (*self.offsets.values(), *self.forces.values()):
             offset[:] = 0.0
-        self.clock, self.runs = ClockCheck(), self.runs + 1
+        self.clock, self.motion = ClockCheck(), ClockMotion()
+        self.runs += 1
 
     @contextmanager
     def kept(self) -> Iterator[None]:
         """Undo the effects of steps and sent efforts, at the time of the last one."""
-        sent, clock, waiting = deepcopy(self.sent), copy(self.clock), {**self.waiting}
+        sent, waiting = deepcopy(self.sent), {**self.waiting}
+        clock, motion = copy(self.clock), copy(self.motion)
         # of the last step, whose arrays the calls write
         last, now = self.acceleration.copy(), self.now
         try:
             yield
         finally:
             self.sent.become(sent)
-            self.clock, self.acceleration, self.now = clock, last, now
+            self.clock, self.motion = clock, motion
+            self.acceleration, self.now = last, now
             self.waiting.clear()
             self.waiting.update(waiting)
 

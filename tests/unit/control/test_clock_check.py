@@ -149,13 +149,13 @@ def test_the_unit_is_seen_when_the_robot_moves_after_a_long_rest(by: str) -> Non
     if by in ("message", "chunk"):
         task = hsp.FramePosition(trajectory=hsp.Stream(), name="hand")
     controller = hsp.Controller(robot, [task])
-    clock, v = controller._memory.clock, np.full(7, 0.2)
+    motion, v = controller._memory.motion, np.full(7, 0.2)
     for k in range(320):
         controller.compute(float(k), robot.home(), np.zeros(7))
-    assert not clock.undecided
+    assert not motion.undecided
     target = robot.state(0.0, robot.home(), v).position("panda_tcp")
     MOVED_BY[by](controller, target)
-    assert controller._memory.clock.undecided
+    assert motion.undecided
 
     def move() -> None:
         for k in range(40):
@@ -186,16 +186,55 @@ def test_times_in_another_unit_are_reported_without_a_period(
     assert len(caught) == 1
 
 
-def test_a_clock_that_runs_back_is_reported_without_a_period() -> None:
+def in_motion(times: Sequence[float], *, way: Sequence[float] = ()) -> list[str]:
+    """Return the messages where nothing is applied, and the robot moves in each step.
+
+    ``way``: the times by which it has moved [s]; by default it moves on steadily.
+    """
+    rng = np.random.default_rng(3)
     robot = hsp.Robot.load("panda")
     controller, v = hsp.Controller(robot, [hsp.FramePosition()]), 0.1 * np.ones(7)
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        for k, t in enumerate(times):
+            s = way[k] if len(way) else H * k
+            noisy = v + 0.01 * rng.normal(size=7)
+            controller.compute(t, robot.home() + s * v, noisy)
+    return [str(each.message) for each in caught if each.category is ClockWarning]
 
-    def run() -> None:
-        for k in range(60):
-            controller.compute(-H * k, robot.home() + H * k * v, v)
 
-    with pytest.warns(ClockWarning, match="the clock runs back"):
-        run()
+LONG = H * np.arange(500)
+
+
+@pytest.mark.parametrize(
+    ("times", "message"),
+    [
+        (-LONG, "runs back: t = -0.0"),
+        (0.0 * LONG, "stands still at t = 0 s, while the robot moves on"),
+        (np.append(LONG, LONG[-1] + 0.0 * LONG), "stands still at t = 0.998 s"),
+        (np.append(LONG, LONG), "runs back: t = 0 s came -0.998 s after"),
+        (np.append(LONG, LONG - 0.5), "runs back: t = -0.5 s came -1.5 s after"),
+        # back by three periods, forward by five, and so on
+        (np.where(np.arange(500) % 2, LONG - 3 * H, LONG), "runs back: t = 0.0"),
+    ],
+)
+def test_a_clock_is_compared_with_the_motion_without_a_period(
+    times: Sequence[float], message: str
+) -> None:
+    """At any time of a run, and once."""
+    (found,) = in_motion(times)
+    assert message in found
+
+
+def test_an_analysis_of_a_motion_is_no_clock_error() -> None:
+    """A log that is read backwards, a state at many times, many states at one time."""
+    still, back = 0.0 * LONG, LONG[::-1]
+    anywhere = np.random.default_rng(4).uniform(-3.0, 3.0, LONG.size)
+    assert in_motion(back, way=back) == []
+    assert in_motion(LONG, way=still) == []
+    assert in_motion(back, way=still) == []
+    assert in_motion(still, way=anywhere) == []
+    assert in_motion(anywhere, way=anywhere) == []
 
 
 @pytest.mark.parametrize("times", [-STEPS, 0.0 * STEPS, np.append(STEPS, STEPS[:10])])

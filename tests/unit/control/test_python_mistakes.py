@@ -65,6 +65,9 @@ def still(c: hsp.Controller) -> InProcessRobot:
     (lambda c: c.at(1).reference(
         "panda_hand", hsp.Stream(messages=[{"at": 0, "value": [1, 2]}])),
      StreamError, r"^trajectory: message 0 of the recording: value has 2 .* needs 3"),
+    (lambda c: c.at(1).limits("tight"),
+     ControllerError, r"limits: 'tight', a str; needs a Limits\(.*\) or None$"),
+    (lambda c: c.at(1).remove("panda_hnad"), ControllerError, "^task: .*'panda_hand'"),
     (lambda c: c.change("gravity"), ControllerError, "change is 'gravity'.*ChangeGrav"),
     (lambda c: c.change(hsp.changes.ChangeGravity),
      ControllerError, "change is ChangeGravity, a class"),

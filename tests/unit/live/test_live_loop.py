@@ -326,12 +326,15 @@ def test_the_monitor_follows_limits_that_change(at_first: Limits | None) -> None
     q = start()
     wide = PositionRange(q - 0.2, q + 0.2)
     narrow = PositionRange(q - 0.05, q + 0.05)
-    unaware = law()
 
     class Beyond(CompensatedController):
+        def __init__(self, source: hsp.Controller) -> None:
+            super().__init__(source)
+            self.unaware = law()
+
         def effort(self, t: float, q: Array, v: Array, period: float) -> Array:
             super().effort(t, q, v, period)
-            return unaware.compute(t, q, v).tau
+            return self.unaware.compute(t, q, v).tau
 
     source = Beyond(law(limits=at_first))
     source.controller.at(0.05).ramp(0.05).limits(Limits(position=wide))
