@@ -4,6 +4,7 @@ import argparse
 import json
 import sys
 from collections.abc import Iterator
+from math import isfinite
 from typing import Any
 
 import numpy as np
@@ -273,16 +274,17 @@ def start_advice(experiment: Experiment, damped: str = "") -> Iterator[str]:
     depth, pair = search.overlap(experiment.q0)
     if depth > 0.0:
         yield f"The start is in collision: {pair} overlap by {depth:.3g} m."
-    elif not damped:
+    elif not (damped and isfinite(start.regularity)):  # it searches for poses only
         return
     try:
         found = search.rounded(search.find(null_space.singularity_threshold))
     except ConfigurationError as error:
         yield f"No better start was found: {error}."
         return
-    yield (
-        "A better start (smallest singular value of the tasks "
-        f"{found.regularity:.3g} instead of {start.regularity:.3g}):"
+    singular = (
+        " (smallest singular value of the tasks "
+        f"{found.regularity:.3g} instead of {start.regularity:.3g})"
     )
+    yield f"A better start{singular if isfinite(start.regularity) else ''}:"
     yield f"    start: {search.start_line(found)}"
     yield "or start: auto, which finds it."

@@ -18,7 +18,7 @@ from hsp_control.config.streams import with_messages
 from hsp_control.declaration import Part, within
 from hsp_control.declaration.located import locate
 from hsp_control.declaration.mistakes import Mistake, domain_error, explained, findings
-from hsp_control.declaration.schema import ValueTypes, shape
+from hsp_control.declaration.schema import shape
 from hsp_control.geometry.scene import Obstacle, Scene
 from hsp_control.geometry.shapes import Mesh
 from hsp_control.robot import Robot
@@ -122,7 +122,7 @@ def validate(document: Document, part: type[Value]) -> Value:
             pending = [(each["loc"], each) for each in error.errors(include_url=False)]
             found = findings(document, shape(part), pending)
         found.sort(key=lambda finding: _order(document, finding))
-        raise _summary([_error(document, each, shape(part)) for each in found])
+        raise _summary([_error(document, each) for each in found])
 
 
 def _order(document: Document, finding: Mistake) -> tuple[bool, tuple[int, ...]]:
@@ -131,11 +131,11 @@ def _order(document: Document, finding: Mistake) -> tuple[bool, tuple[int, ...]]
     return mark is None, tuple(mark or ())
 
 
-def _error(document: Document, finding: Mistake, root: ValueTypes) -> HspControlError:
+def _error(document: Document, finding: Mistake) -> HspControlError:
     """Return the error of a finding; one that a part raised keeps its class."""
     own = domain_error(finding.error)
     if own is None:
-        message, (*holder, key) = explained(finding, root), finding.path or ("",)
+        message, (*holder, key) = explained(finding), finding.path or ("",)
         if finding.kind == "union_tag_not_found" and isinstance(key, str):
             beside = reduce(getitem, holder, document.to_dict())  # type: ignore[arg-type]
             message += did_you_mean(key, [name for name in beside if name != key])

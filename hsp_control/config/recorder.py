@@ -60,6 +60,8 @@ class Recorder:
         """
         check_kind("controller is", controller, Controller, LogError)
         check_positive("log_period", log_period, "s", LogError)
+        if path is not None and not isinstance(path, str | Path):
+            raise LogError(f"path is {path!r}; needs a file, such as 'out/mine.npz'")
         self.path = None if path is None else Path(path)
         self._folder = TemporaryDirectory() if path is None else None
         where = Path(self._folder.name) / "log" if self._folder else Path(str(path))

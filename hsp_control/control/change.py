@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from pydantic import AfterValidator
 
-from hsp_control.common.errors import ContactError, ControllerError
+from hsp_control.common.errors import ContactError, ControllerError, SceneError
 from hsp_control.common.suggestions import did_you_mean, listing
 from hsp_control.constraints.contacts import CommandedForce
 from hsp_control.constraints.limits import LimitsOrNone, RobotLimits
@@ -264,7 +264,8 @@ class AddTask(Change, type="add_task"):
     def apply(self, setup: Setup) -> Setup:
         """Return the setup with the task; see `Change.apply`."""
         there = [each.task for each in setup.tasks if each.presence.target == 1.0]
-        check_tasks([*there, self.task], setup.start.state.robot)
+        with within("task"):
+            check_tasks([*there, self.task], setup.start.state.robot)
         presence = ABSENT.then(self.at, self.ramp, 1.0)
         added = planned_task(setup.count, self.task, presence)
         return replace(setup, tasks=(*setup.tasks, added), count=setup.count + 1)
@@ -294,15 +295,16 @@ class ChangeGains(Change, type="gains"):
     def apply(self, setup: Setup) -> Setup:
         """Return the setup with the gains; see `Change.apply`."""
         planned = _task(setup, self.task)
-        if planned.task.order != 2:
-            raise ControllerError(
-                f"task {self.task!r} has no gains: its error equation is of first order"
-            )
-        if impedance_of(planned.task) is not None:
-            raise ControllerError(
-                f"task {self.task!r} has an impedance instead of gains; a change of "
-                "type impedance changes it"
-            )
+        with within("task"):
+            if planned.task.order != 2:
+                raise ControllerError(
+                    f"{self.task!r} has no gains: its error equation is of first order"
+                )
+            if impedance_of(planned.task) is not None:
+                raise ControllerError(
+                    f"{self.task!r} has an impedance instead of gains; a change of "
+                    "type impedance changes it"
+                )
         with within("gains"):
             target = np.stack(self.gains.matrices(planned.task.rows))
         gains = planned.gains.then(self.at, self.ramp, target)
@@ -333,10 +335,11 @@ class ChangeImpedance(Change, type="impedance"):
         """Return the setup with the impedance; see `Change.apply`."""
         planned = _task(setup, self.task)
         if impedance_of(planned.task) is None:
-            raise ControllerError(
-                f"task {self.task!r} has no impedance from the start, so none can "
-                "follow; give it one"
-            )
+            with within("task"):
+                raise ControllerError(
+                    f"{self.task!r} has no impedance from the start, so none can "
+                    "follow; give it one"
+                )
         with within("impedance"):
             target = self.impedance.numbers(planned.task.error_parts)
             numbers = planned.gains.then(self.at, self.ramp, target)
@@ -370,7 +373,9 @@ class ChangeReference(Change, type="reference"):
     def placed(self, start: Start, setup: Setup) -> Self:
         """Return the change with its trajectory in the world."""
         task = _task(setup, self.task).task
-        followed = task.following(self.trajectory).placed(start).followed
+        with within("trajectory"):
+            following = task.following(self.trajectory)
+        followed = following.placed(start).followed
         assert followed is not None
         return replace(self, trajectory=followed)
 
@@ -423,6 +428,9 @@ class MoveObstacle(Change, type="obstacle"):
         scene = setup.start.scene
         with within("obstacle"):
             old = scene[self.obstacle]
+        with within("center"):
+            if (count := self.center.dimension) != 3:
+                raise SceneError(f"its dimension is {count}; needs 3 (x, y, z)")
         center = Crossfade(
             old.center, self.center, start_time=self.at, duration=self.ramp
         )

@@ -49,10 +49,8 @@ class ClockMotion:
         self._usual = 0.0  # time that the last step's way needed [s]
         self._returned_to = -inf
         self._jump: tuple[float, float] | None = None  # back: where to, and how far [s]
-        self._kind, self._count = (
-            "",
-            0,
-        )  # steps in which it moves on, its clock does not
+        self._since = 0  # steps forward after it
+        self._kind, self._count = "", 0  # steps in which the robot alone moves on
 
     def look_again(self) -> None:
         """Check the next steps, if the unit of times is not known yet."""
@@ -67,14 +65,16 @@ class ClockMotion:
         """
         if t == self._returned_to or self._returns > _LOOKS:
             return
-        self._returned_to, self._returns = t, self._returns + 1
-        far = self._usual > 0.0 and t < self.latest - _FAR * self._usual
-        if far:
-            self._jump = t, t - self.latest
-        if far or not self.undecided:
+        self._returned_to = t
+        back = self.latest - t
+        if back > 0.0:
+            self._returns += 1
+            if back > _FAR * self._usual > 0.0:
+                self._jump = self._jump or (t, -back)
+                self._before = None
+        if not self.undecided:
             self._before = None
-        self._looks = self._alike = 0
-        self.undecided = True
+        self._looks, self.undecided = 0, True
 
     def compare(self, state: RobotState) -> str:
         """Compare a step's displacement with velocity times time.
@@ -93,13 +93,15 @@ class ClockMotion:
             return ""
         passed = state.t - before[0]
         way = state.robot.difference(before[1], state.q)
+        if passed == 0.0 and not way.any():  # a repeated state
+            return ""
         mean = 0.5 * (before[2] + v)
         needed = mean.dot(way) / max(mean.dot(mean), 1e-300)  # for this way [s]
         if passed > 0.0:
             return self._forward(passed, needed)
         aside = way - needed * mean
         goes_on = aside.dot(aside) < _ASIDE**2 * way.dot(way)
-        return self._not_forward(state.t, passed, needed if goes_on else 0.0)
+        return self._not_forward(passed, needed if goes_on else 0.0)
 
     def _forward(self, passed: float, needed: float) -> str:
         """Compare the time of a step with the time that its way needs [s]."""
@@ -113,10 +115,16 @@ class ClockMotion:
         self._unit = unit
         if unit == "" or self._alike < _SURE:
             return ""
-        self.undecided = False
         if self._jump is not None:
             t, back = self._jump
-            return BACK.format(t=t, passed=back)
+            self._since += 1
+            if self.latest > t - back:  # an analysis, such as an integrator's stages
+                self._jump, self._since = None, 0
+            elif self._since < _SURE:
+                return ""
+            else:
+                return BACK.format(t=t, passed=back)
+        self.undecided = False
         if unit == _SECONDS:
             return ""
         return (
@@ -124,21 +132,20 @@ class ClockMotion:
             f"step {passed:.3g} s: {unit}? Times are in s"
         )
 
-    def _not_forward(self, t: float, passed: float, needed: float) -> str:
+    def _not_forward(self, passed: float, needed: float) -> str:
         """Count steps of a robot that moves on; ``needed`` is zero if it does not [s].
 
         It does not where a state is repeated, or a log is read backwards.
         """
-        self._jump = None  # as in an integrator's stages
+        self._jump, self._since = None, 0
         low, high = (factor * self._usual for factor in _SAME)
         kind = "back" if passed < 0.0 else "still"
         goes_on = low < needed < (high or _LONGEST)
-        self._count = (
-            self._count + 1 if goes_on and kind == self._kind else int(goes_on)
-        )
-        self._kind = kind
+        before = self._count if kind == self._kind else 0
+        self._kind, self._count = kind, before + 1 if goes_on else 0
         if self._count < _SURE:
             return ""
+        t = self.latest
         if kind == "back":
             return BACK.format(t=t, passed=passed)
         return f"the clock stands still at t = {t:.10g} s, while the robot moves on"

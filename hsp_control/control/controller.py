@@ -225,15 +225,14 @@ class Controller(Commanded):
             tau = self._declared.robot.check_tangent(tau, "effort tau")
         if type(period) is not float or not 0.0 < period < inf:
             period = check_positive("period", period, "s", ControllerError)
-        self._memory.clock.look(self._state.t, period, self._state.stamp)
+        memory = self._memory
+        memory.clock.look(memory.motion.latest, period, self._state.stamp)
         if not self._memory.sent.period:
             state = self._state
             warn_of_jump(state.robot, state.q, state.v, tau, state.dynamics)
         now = self._in_force
         now.limits.applied(tau, self._memory.acceleration, period)
         if now.gains.stiffening:
-            if now.mixture.active is None:  # a copy, made since the step
-                now.mixture.resolve(self._state.t)
             now.gains.delay(self._active, self._state.t, period)
 
     def _while_free(self, advance: Callable[[FreeStep], int]) -> int:
@@ -399,10 +398,13 @@ class Controller(Commanded):
 
     @property
     def _active(self) -> ActiveStack:
-        active = self._in_force.mixture.active
-        if active is None:
-            raise ControllerError("nothing has been computed yet")
-        return active
+        mixture = self._in_force.mixture
+        if mixture.active is None:
+            if not self._memory.begun:
+                raise ControllerError("nothing has been computed yet")
+            mixture.resolve(self._state.t)  # of a copy, or since a change
+        assert mixture.active is not None
+        return mixture.active
 
     def without_python(self, period: float) -> "Controller":
         """Return a preview whose streams, weights and forces a program sets.

@@ -75,7 +75,7 @@ class InForce:
         if self._memory.begun:
             self.bind_ahead()
             step = self._bound_step()
-        self._go_on(step)
+        self.step = step
 
     def go_over_to(self, time_line: TimeLine) -> None:
         """Follow another time line; if it cannot be bound, the previous one is kept."""
@@ -165,11 +165,6 @@ class InForce:
         self.time_line, self.setup = time_line, setup
         self.gains.plan(setup, t)
         self.limits.plan(setup.limits, t)
-
-    def _go_on(self, step: BoundStep | BoundMixture | None) -> None:
-        self.step = step
-        if isinstance(step, BoundStep):
-            self.mixture.active = step.active
 
 
 class AfterChanges(NamedTuple):

@@ -1,8 +1,8 @@
-"""The places at which a misplaced key would be right."""
+"""The places, and the types, of which a misplaced key would be right."""
 
 from collections.abc import Iterator, Sequence
 
-from hsp_control.declaration.language import joined
+from hsp_control.declaration.language import joined, spoken
 from hsp_control.declaration.located import KeyPath, place_of
 from hsp_control.declaration.schema import ValueTypes, entry, is_model, keys
 
@@ -14,21 +14,21 @@ _ANY = "*"
 """Any name or number of a part, in a place."""
 
 
-def home_of(key: str, holder: KeyPath, levels: Sequence[ValueTypes]) -> str:
+def home_of(path: KeyPath, levels: Sequence[ValueTypes]) -> str:
     """Return ``; it belongs to 'null_space.fields.*'`` for an unknown key, or "".
 
     Args:
-        key: The unknown key.
-        holder: The path of the mapping that has it.
-        levels: What the root may be, and the value at each part of that path.
+        path: The unknown key.
+        levels: What each mapping around it may be, from the root to its own one.
     """
+    *holder, key = path
     steps: dict[str, int] = {}  # up and down, by place
     for up, level in enumerate(reversed(levels[-_STEPS - 1 :])):
         above = holder[: len(holder) - up]
-        for below in _below(level, key, _STEPS - up):
+        for below in _below(level, str(key), _STEPS - up):
             place = (*above, *below)
-            if place == holder or place == (*holder[:-1], _ANY):
-                continue  # other types of part there have it
+            if place == (*holder[:-1], _ANY):  # others in the same list have it
+                continue
             words = f"to {place_of(place)!r}"
             if up and not below:
                 words = f"beside {holder[len(above)]!r}"
@@ -39,7 +39,24 @@ def home_of(key: str, holder: KeyPath, levels: Sequence[ValueTypes]) -> str:
     return f"; it belongs {joined(told)}" if 0 < len(told) <= _MOST else ""
 
 
-def inside(level: ValueTypes, key: str | int) -> ValueTypes:
+def relatives_with(key: str, holder: ValueTypes) -> str:
+    """Return ``; type frame_pose has it``, of the same family, or "".
+
+    Args:
+        key: The unknown key.
+        holder: What the mapping is that has it.
+    """
+    told = [
+        spoken(f"type {name}", member.__name__)
+        for option in holder.options[:1]  # with its type given it is the only one
+        if (family := getattr(option, "family", None)) is not None
+        for name, member in family.members.items()
+        if key in keys(ValueTypes((member,)))
+    ]
+    return f"; {joined(told)} has it" if 0 < len(told) <= _MOST else ""
+
+
+def _inside(level: ValueTypes, key: str | int) -> ValueTypes:
     """Return what the value of a key may be, in any option."""
     found = (entry(option, key) for option in level.options)
     return ValueTypes(tuple(o for each in found if each for o in each.options))
@@ -50,9 +67,9 @@ def _below(level: ValueTypes, key: str, steps: int) -> Iterator[KeyPath]:
     if key in keys(level):
         yield ()
     for name in keys(level) if steps > 0 else ():
-        value = inside(level, name)
+        value = _inside(level, name)
         for path in _below(value, key, steps - 1):
             yield (name, *path)
         several = tuple(o for o in value.options if not is_model(o))
-        for path in _below(inside(ValueTypes(several), 0), key, steps - 2):
+        for path in _below(_inside(ValueTypes(several), 0), key, steps - 2):
             yield (name, _ANY, *path)

@@ -10,7 +10,6 @@ import dataclasses
 import re
 from collections import defaultdict
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from itertools import accumulate, islice
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol, TypeAlias, get_args, get_origin
 
@@ -22,7 +21,7 @@ from hsp_control.common.suggestions import did_you_mean, listing, nearest
 from hsp_control.declaration.families import Declared
 from hsp_control.declaration.language import joined, kind, misfit, shown, spoken
 from hsp_control.declaration.located import KeyPath, written
-from hsp_control.declaration.misplaced import home_of, inside
+from hsp_control.declaration.misplaced import home_of, relatives_with
 from hsp_control.declaration.plain_data import plain_data
 from hsp_control.declaration.schema import (
     ValueTypes,
@@ -66,6 +65,8 @@ class Mistake(NamedTuple):
     value: Any  # the wrong value or key; for missing keys, their list
     expected: ValueTypes  # the allowed types there; for keys, those of their mapping
     error: ErrorDetails  # pydantic's own error
+    # for an unknown key: of each mapping around its own one, from the root on
+    above: tuple[ValueTypes, ...] = ()
 
 
 def findings(
@@ -73,8 +74,12 @@ def findings(
     expected: ValueTypes,
     errors: Sequence[Pending],
     path: KeyPath = (),
+    above: tuple[ValueTypes, ...] = (),
 ) -> list[Mistake]:
-    """Return one finding per mistake at ``path`` or below it."""
+    """Return one finding per mistake at ``path`` or below it.
+
+    ``above`` has what each mapping around the value is.
+    """
     found = [_here(path, expected, error) for ahead, error in errors if not ahead]
     below: dict[str | int, list[Pending]] = defaultdict(list)
     for ahead, error in errors:
@@ -84,18 +89,18 @@ def findings(
         choices = tagged(expected.options, expected.discriminator)
         for tag, inner in below.items():
             chosen = shape(choices.get(tag, Any))._replace(tag=expected.discriminator)
-            found += findings(document, chosen, inner, path)
+            found += findings(document, chosen, inner, path, above)
         return found
     if len(expected.options) == 1:
         for key, inner in below.items():
-            found += _at_key(document, expected, inner, path, key)
+            found += _at_key(document, expected, inner, path, key, above)
         return _gathered(found, path)
     # Below a union, pydantic labels the alternatives with its own names. All of them
     # failed, so all of them are in the list, in their order.
     known = len(below) == len(expected.options)
     options = expected.options if known else [Any] * len(below)
     tries = [
-        findings(document, shape(option), inner, path)
+        findings(document, shape(option), inner, path, above)
         for option, inner in zip(options, below.values(), strict=True)
     ]
     return found + (_most_likely(document, tries, path) if tries else [])
@@ -130,6 +135,7 @@ def _at_key(
     errors: Sequence[Pending],
     path: KeyPath,
     key: str | int,
+    above: tuple[ValueTypes, ...],
 ) -> list[Mistake]:
     """Return the findings at one key of the value at ``path``, which is not a union."""
     found: list[Mistake] = []
@@ -141,7 +147,7 @@ def _at_key(
         elif ahead or kind not in ("extra_forbidden", "missing"):
             deeper.append((ahead, error))
         elif kind == "extra_forbidden":
-            found.append(Mistake((*path, key), kind, key, holder, error))
+            found.append(Mistake((*path, key), kind, key, holder, error, above))
         elif isinstance(key, int):  # a tuple without its last entries
             found.append(Mistake(path, "too_short", error["input"], holder, error))
         else:
@@ -150,8 +156,11 @@ def _at_key(
         return found + [Mistake(path, "key", path[-1], holder, e) for _, e in deeper]
     within = entry(holder.options[0], key)
     if within is None and (*path, key) not in document:  # a label of pydantic
-        return found + findings(document, shape(Any), deeper, path)
-    return found + findings(document, within or shape(Any), deeper, (*path, key))
+        return found + findings(document, shape(Any), deeper, path, above)
+    inside = (*above, holder)
+    return found + findings(
+        document, within or shape(Any), deeper, (*path, key), inside
+    )
 
 
 def _gathered(found: list[Mistake], path: KeyPath) -> list[Mistake]:
@@ -211,23 +220,18 @@ _ENTRIES = ("entry", "entries")
 _LONG_LIST = 40
 
 
-def explained(finding: Mistake, root: ValueTypes, key: str = "key") -> str:
+def explained(finding: Mistake, key: str = "key") -> str:
     """Return the message for a finding, without its location.
 
-    Args:
-        finding: The mistake.
-        root: What the value may be that its path begins in.
-        key: The word for a name that is missing or unknown.
+    A missing or unknown name is called ``key``.
     """
     value, expected = finding.value, finding.expected
     match finding.kind:
         case "mismatch" if words := joined(_words(expected)):
             return _mismatch(value, words, expected)
         case "extra_forbidden":
-            *holder, unknown = finding.path
-            above = accumulate(holder, inside, initial=root)
-            levels = [*islice(above, len(holder)), expected]
-            home = home_of(str(unknown), tuple(holder), levels)
+            home = relatives_with(str(value), expected)
+            home = home or home_of(finding.path, [*finding.above, expected])
             return f"unknown {key} {_unknown(value, keys(expected), home)}"
         case "missing":
             return _missing(key, value, keys(expected, required=True))
@@ -426,8 +430,8 @@ def as_error(finding: Mistake, cls: type[Declared]) -> HspControlError:
     kind = cls.error if own is None else type(own)
     own_argument = finding.kind == "missing" and not finding.path
     if own_argument or (finding.kind == "extra_forbidden" and len(finding.path) == 1):
-        return kind(f"{where}: {explained(finding, shape(cls), 'argument')}")
-    return kind(f"{where}: {_in_python(finding) or explained(finding, shape(cls))}")
+        return kind(f"{where}: {explained(finding, 'argument')}")
+    return kind(f"{where}: {_in_python(finding) or explained(finding)}")
 
 
 def _in_python(finding: Mistake) -> str:

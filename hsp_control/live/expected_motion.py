@@ -29,7 +29,8 @@ class ExpectedMotion:
     positions, and the mean of the trusted ones of these. An expectation is integrated
     with the model under the efforts applied and the load, and follows its source by a
     limited step, so that a jump of a sensor is not followed at once. A second state of
-    the first two estimates the acceleration that the model lacks yet.
+    the first two estimates the acceleration that the model lacks yet. Braked joints
+    keep it while both are trusted: the load may come from the wrong one.
 
     Attributes:
         v: The expected velocities, shape (3, nv) [rad/s or m/s].
@@ -38,6 +39,7 @@ class ExpectedMotion:
         usual: Those before the last one, shape (3, nv).
         acceleration: The acceleration by the applied efforts and the model, without
         the load, shape (nv,).
+        loaded: The one with it, shape (nv,).
     """
 
     def __init__(
@@ -56,9 +58,13 @@ class ExpectedMotion:
         self.before = self.v
         self.surprise: Array = np.zeros((3, v.size))
         self.usual = self.surprise
-        self._missed = np.zeros((3, v.size))  # none of the mean
+        # by the first two sources: what load and model lack, and what the model lacked
+        # before the joints were braked
+        self._missed: Array = np.zeros((2, v.size))
+        self._lacking = self._missed
+        self._kept: Flags = np.zeros(v.size, dtype=bool)  # whether that still counts
         self.acceleration: Array = np.zeros(v.size)
-        self._loaded = self.acceleration
+        self.loaded = self.acceleration
 
     def apply(self, q: Array, v: Array, tau: Array, load: Array) -> None:
         """Record the effort and the load that act from now on, (nv,), at a state."""
@@ -71,11 +77,13 @@ class ExpectedMotion:
         except HspControlError:
             return
         if np.isfinite([acceleration, loaded]).all():
-            self.acceleration, self._loaded = acceleration, loaded
+            self.acceleration, self.loaded = acceleration, loaded
 
     def advance(self, passed: float) -> None:
         """Advance by a time [s]."""
-        self.v = self.v + passed * (self._loaded + self._missed)
+        own = np.where(self._kept, self.acceleration + self._lacking, self.loaded)
+        own = own + self._missed
+        self.v = self.v + passed * np.vstack([own, self.loaded])
 
     def follow(
         self, measured: Array, trusted: Flags, passed: float, *, braked: bool
@@ -101,7 +109,10 @@ class ExpectedMotion:
         rates = np.minimum(self._rates[known], self._most)
         self.v = self.v + np.minimum(2.0 * rates * passed, 1.0) * step
         gain = min(self._rate**2 * passed, self._rate)
-        self._missed[:2] = (self._missed[:2] + gain * step[:2]) * (known == 2)
+        self._missed = (self._missed + gain * step[:2]) * (known == 2)
+        self._kept = np.asarray(trusted.all(axis=0) & braked)
+        if not braked:
+            self._lacking = self.loaded - self.acceleration + self._missed
 
     def begin_again(self, joints: Flags, measured: Array) -> None:
         """Expect joints, shape (nv,), at the velocity of a source, shape (nv,)."""

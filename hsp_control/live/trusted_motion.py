@@ -131,6 +131,15 @@ class TrustedMotion:
         """Joints whose positions are trusted, shape (nv,)."""
         return self._positions
 
+    @property
+    def _known_acceleration(self) -> Array:
+        """The expected acceleration with the load if it is one, shape (nv,).
+
+        Before a stop, what holds a joint is no load: its sensor may be dead.
+        """
+        expected = self._expected
+        return expected.loaded if self.stopping else expected.acceleration
+
     def stop(self) -> None:
         """Begin braking: a joint that accelerates now has a wrong sensor or motor."""
         self.stopping = True
@@ -143,19 +152,16 @@ class TrustedMotion:
         ``load`` is the external effort on the joints, shape (nv,); ``inertia`` the mass
         matrix, shape (nv, nv); None: it is computed.
         """
-        if self.stopping:
-            # Before, what holds a joint is no load for the checks: its sensor may be
-            # dead.
-            tau, load = tau + load, np.zeros_like(load)
         self._expected.apply(q, v, tau, load)
         robot, dynamics = self._robot, self._dynamics
+        known = load if self.stopping else np.zeros_like(load)
         if self.complete and self._moving:
-            self._sensors.judge(q, v, tau, dynamics)
+            self._sensors.judge(q, v, tau + known, dynamics)
         if robot.unactuated:
             return
         if inertia is None:
             inertia = robot.mass_matrix(q, dynamics)
-        effort = inertia @ self._expected.acceleration
+        effort = inertia @ self._known_acceleration
         gravity = robot.inverse_dynamics(q, 0.0 * v, 0.0 * v, dynamics)
         self._driving = Driving(inertia, effort, gravity)
 
@@ -180,10 +186,11 @@ class TrustedMotion:
             self._moving = True
             expected.begin(smaller(way / passed, new.v))
         expected.advance(passed)
-        check.update(way, new.v, passed, expected.acceleration)
+        acceleration = self._known_acceleration
+        check.update(way, new.v, passed, acceleration)
         self._sensors.update(way, new.v, check.mean, passed)
         if self.complete:
-            self._response.update(expected.acceleration, check.mean, passed)
+            self._response.update(acceleration, check.mean, passed)
             if (driving := self._driving) is not None:
                 now = np.stack([new.v, way / passed])
                 means = np.stack([check.mean, check.slope])

@@ -17,8 +17,10 @@ import pytest
 from places import ON_MUJOCO
 from wording import wording
 
+import hsp_control as hsp
 from hsp_control import NullSpaceField, Rollout, __version__
 from hsp_control.cli import doctor, main, options, robot_table
+from hsp_control.cli.check import start_advice
 from hsp_control.cli.interrupts import DeferredInterrupt
 
 MOVING = "paper/4_moving_obstacle"
@@ -468,3 +470,18 @@ def test_a_package_whose_command_is_broken_stops_no_other(
     assert main(["schema"]) == 0
     report = "hsp: 'fly' cannot be imported from no_such_package.command:FLY: No module"
     assert report in capsys.readouterr().err
+
+
+POINTING = hsp.Pointing("tool0", direction=[1.0, 0.0, 0.0])
+
+
+@pytest.mark.parametrize(
+    ("task", "better"), [(hsp.FramePose("tool0"), True), (POINTING, False)]
+)
+def test_a_better_start_is_searched_for_poses(task: hsp.Task, better: bool) -> None:
+    straight = hsp.InitialState(configuration=[0.0] * 6)
+    made = hsp.Experiment("ur5", [task], start=straight)
+    lines = [*start_advice(made, "hand")]
+    assert lines[0].startswith("The tasks hand are singular at the start")
+    assert ("A better start (smallest singular value" in "\n".join(lines)) == better
+    assert "inf" not in "\n".join(lines)

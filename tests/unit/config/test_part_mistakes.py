@@ -126,7 +126,7 @@ MISTAKES: list[tuple[dict[str, Any], str, str]] = [
      "changes.0.task.frame: no ... 'panda_hnd' ... 'panda_hand'"),
     (change(type="add_task", task={"type": "frame_position", "name": "hand"}),
      "ControllerError",
-     "changes.0: two tasks ... 'hand'"),
+     "changes.0.task: two tasks ... 'hand'"),
     (change(type="field", fields=[{"type": "joint_centering", "weights": [1, 1]}]),
      "FieldError",
      "changes.0.fields.0.weights: weights ... (2,) ... one number"),

@@ -214,6 +214,7 @@ LONG = H * np.arange(500)
         (np.append(LONG, LONG[-1] + 0.0 * LONG), "stands still at t = 0.998 s"),
         (np.append(LONG, LONG), "runs back: t = 0 s came -0.998 s after"),
         (np.append(LONG, LONG - 0.5), "runs back: t = -0.5 s came -1.5 s after"),
+        (LONG - 0.04 * (np.arange(500) // 10), "runs back: t = -0.02 s came -0.038 s"),
         # back by three periods, forward by five, and so on
         (np.where(np.arange(500) % 2, LONG - 3 * H, LONG), "runs back: t = 0.0"),
     ],
@@ -224,6 +225,12 @@ def test_a_clock_is_compared_with_the_motion_without_a_period(
     """At any time of a run, and once."""
     (found,) = in_motion(times)
     assert message in found
+
+
+def test_a_repeated_state_hides_no_jump() -> None:
+    steps = np.repeat(np.arange(1000), 1 + (np.arange(1000) % 25 == 0))
+    (found,) = in_motion(np.append(LONG, LONG)[steps], way=H * steps)
+    assert "runs back: t = 0 s came -0.998 s after" in found
 
 
 def test_an_analysis_of_a_motion_is_no_clock_error() -> None:

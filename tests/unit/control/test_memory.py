@@ -66,6 +66,23 @@ def test_a_copy_goes_on_to_the_last_bit(kind: str, between: bool) -> None:
 
 
 @pytest.mark.parametrize("kind", COPIES)
+@pytest.mark.parametrize("fading", [False, True])
+def test_a_copy_is_diagnosed_at_the_step_before_it(kind: str, fading: bool) -> None:
+    made = controller()
+    if fading:
+        wrist = hsp.JointPosture(joints=["panda_joint7"], name="wrist")
+        made.at(0.0).ramp(1.0).add(wrist)
+    for k in range(3):
+        computed(made, k)
+    twin = COPIES[kind](made)
+    for own, other in zip(made.diagnose(), twin.diagnose(), strict=True):
+        np.testing.assert_array_equal(own, other)
+    rows = made.active_stack.rows
+    np.testing.assert_array_equal(rows.jacobian, twin.active_stack.rows.jacobian)
+    assert rows.jacobian.any()
+
+
+@pytest.mark.parametrize("kind", COPIES)
 def test_a_copy_does_not_repeat_reports(kind: str) -> None:
     """No memory of the first effort, nor of a stopped clock, remains."""
     made = controller()

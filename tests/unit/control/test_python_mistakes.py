@@ -12,9 +12,12 @@ from hsp_control.common.errors import (
     ControllerError,
     GainError,
     LiveError,
+    LogError,
     NonFiniteError,
+    SceneError,
     SimulationError,
     StreamError,
+    TaskError,
 )
 from hsp_control.live import InProcessRobot, SimulatedRobot
 
@@ -65,6 +68,17 @@ def still(c: hsp.Controller) -> InProcessRobot:
     (lambda c: c.at(1).reference(
         "panda_hand", hsp.Stream(messages=[{"at": 0, "value": [1, 2]}])),
      StreamError, r"^trajectory: message 0 of the recording: value has 2 .* needs 3"),
+    (lambda c: controller(scene=[hsp.Obstacle("o", hsp.Sphere(0.1), [1, 1, 1])]).at(
+        1.0).obstacle("o", [0.3, 0.3]), SceneError, r"^center: its dimension is 2"),
+    (lambda c: turned().at(1).gains("panda_hand", hsp.Gains(1.0, [1.0, 2.0])),
+     GainError, "^gains: kv"),
+    (lambda c: c.at(1).impedance("panda_hand", hsp.Impedance(stiffness=9.0)),
+     ControllerError, "^task: 'panda_hand' has no impedance"),
+    (lambda c: c.at(1).add(hsp.FramePose("panda_hand")),
+     ControllerError, "^task: two tasks"),
+    (lambda c: hsp.FramePosition("panda_hand", along="tool"),
+     TaskError, "unknown argument 'along'; FramePose has it"),
+    (lambda c: hsp.Recorder(c, 3), LogError, "^path is 3; needs a file"),
     (lambda c: c.at(1).limits("tight"),
      ControllerError, r"limits: 'tight', a str; needs a Limits\(.*\) or None$"),
     (lambda c: c.at(1).remove("panda_hnad"), ControllerError, "^task: .*'panda_hand'"),
