@@ -479,7 +479,7 @@ POINTING = hsp.Pointing("tool0", direction=[1.0, 0.0, 0.0])
     ("task", "better"), [(hsp.FramePose("tool0"), True), (POINTING, False)]
 )
 def test_a_better_start_is_searched_for_poses(task: hsp.Task, better: bool) -> None:
-    straight = hsp.InitialState(configuration=[0.0] * 6)
+    straight = hsp.simulation.InitialState(configuration=[0.0] * 6)
     made = hsp.Experiment("ur5", [task], start=straight)
     lines = [*start_advice(made, "hand")]
     assert lines[0].startswith("The tasks hand are singular at the start")
