@@ -215,6 +215,14 @@ def test_no_lie_accelerates_a_joint_of_another_arm(
     check_braked(robot, report, before=0)
 
 
+def test_a_drift_that_the_loop_follows_is_found_in_the_stop() -> None:
+    """The load that a drifting velocity shows must not make it look right."""
+    kind = LIES["velocity: drifting slowly"]
+    robot, report = run(AT_REST, kind, ALL, 0.001, "xarm7")
+    assert "contradicts its positions" in report.reason
+    check_braked(robot, report, before=0)
+
+
 @pytest.mark.parametrize(
     "kind", ["+0.5", "the sign", "degrees", *further("+3", "-2", "stuck at 1")]
 )
