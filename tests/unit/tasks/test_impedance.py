@@ -315,10 +315,10 @@ REFUSED: dict[str, tuple[Callable[[], Any], type[Exception], str]] = {
     "gains of a spring": (
      lambda: panda_hand(impedance=Impedance(1.0)).at(1.0).gains("hand", GAINS),
      ControllerError,
-     "... task 'hand' ... impedance instead of gains"),
+     "task: 'hand' ... impedance instead of gains"),
     "spring of gains": (lambda: panda_hand().at(1.0).impedance("hand", Impedance(1.0)),
      ControllerError,
-     "... task 'hand' has no impedance"),
+     "task: 'hand' has no impedance"),
     "rows of a change": (
      lambda: later(Impedance(1.0)).impedance("hand", Impedance([1.0, 2.0])), GainError,
      "impedance: stiffness ... (2,) ... a number"),
