@@ -8,6 +8,7 @@ import pytest
 
 import hsp_control as hsp
 from hsp_control.common.arrays import Array
+from hsp_control.control.mixture import AccelerationModifier
 from hsp_control.declaration import Part
 
 BALL = hsp.Obstacle("ball", hsp.Sphere(0.1), hsp.Hold([0.6, 0.4, 0.6]))
@@ -103,15 +104,21 @@ def test_an_applied_effort_is_checked(tau: Array, period: float, message: str) -
     assert np.isfinite(output.tau).all()
 
 
-def test_an_offset_that_is_not_finite_is_never_delivered() -> None:
-    controller = panda()
+@pytest.mark.parametrize(
+    "modifier",
+    [
+        lambda state, stack, a: (a, np.full(7, np.nan)),
+        lambda state, stack, a: (a + 1e308, None),  # finite; M a overflows
+    ],
+)
+@pytest.mark.parametrize("limits", [None, hsp.Limits()])
+def test_an_effort_that_is_not_finite_is_never_delivered(
+    modifier: AccelerationModifier, limits: hsp.Limits | None
+) -> None:
+    controller = panda(limits=limits)
+    q, v = controller.robot.home(), np.zeros(7)
     with pytest.raises(hsp.errors.NonFiniteError):
-        controller.compute(
-            0.0,
-            controller.robot.home(),
-            np.zeros(7),
-            modifier=lambda state, stack, a: (a, np.full(7, np.nan)),
-        )
+        controller.compute(0.0, q, v, modifier=modifier)
 
 
 def test_a_foreign_state_gives_the_same_effort() -> None:
