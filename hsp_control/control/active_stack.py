@@ -3,7 +3,6 @@
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from functools import cached_property, partial
-from math import isfinite
 from typing import Any, NamedTuple, NoReturn
 
 import numpy as np
@@ -269,7 +268,7 @@ class ActiveStack:
 
     def check(self, effort: Array) -> None:
         """Raise if an effort that a step delivers is not finite."""
-        if not isfinite(effort.dot(effort)):
+        if not np.isfinite(effort).all():
             self.raise_not_finite()
 
     def raise_not_finite(self) -> NoReturn:
