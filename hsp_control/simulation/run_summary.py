@@ -4,6 +4,7 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
+from hsp_control.common.arrays import Array
 from hsp_control.control.compensation.momentum_observer import LARGE_SHARE
 from hsp_control.simulation.limit_excess import POSITION, VELOCITY
 from hsp_control.simulation.log import Log
@@ -23,8 +24,10 @@ from hsp_control.simulation.measures import (
     unreached,
 )
 
-LOST, STILL = 0.5, 0.05
-"""Share of a field, and a speed [rad/s or m/s], above which limits prevent it."""
+STILL = 0.05
+"""Speed of a field above which limits prevent it [rad/s or m/s]."""
+FAST = 0.1
+"""Share of a speed limit beyond it that shows that the model is wrong."""
 GIVEN_UP = 0.01
 """Share of a commanded force above which its plan misses it."""
 
@@ -139,12 +142,16 @@ def _text(measure: Measure) -> str:
 
 
 def beyond_limits(rollout: Log) -> str:
-    """Return a warning if a field demands more than limits permit at the end."""
+    """Return a warning if a field demands more than limits permit at the end.
+
+    Of |P g| <= |e_N| + |v| more is missing then than is followed.
+    """
     last = slice(-max(len(rollout) // 10, 1), None)
     asked = np.linalg.norm(rollout["field.g"][-1])
     missing = rollout["null_space_norm"][-1]
-    held = np.isin(rollout["status"][last], (2, 4)).all()
-    if not (held and missing >= LOST * asked and missing >= STILL):  # or NaN
+    followed = np.linalg.norm(rollout.v[-1])
+    held = np.isin(rollout["status"][last], (2, 4)).all() and asked >= STILL
+    if not (held and missing >= followed and missing >= STILL):  # or NaN
         return ""
     unit = rate_unit(rollout)
     return (
@@ -180,18 +187,34 @@ def unexplained_rows(rollout: Log) -> Iterator[str]:
     unit = effort_units(rollout)[dof]
     text = f"up to {size[dof]:.3g} {unit} that the model does not explain, on "
     yield text + rollout.meta["robot"]["dofs"][dof]
-    limits = np.array(rollout.meta["limits"].get("effort", []), dtype=float)
-    if len(limits) == len(size):  # NaN: there is none
-        share = size / np.where(limits > 0.0, limits, np.inf)
-        dof = int(share.argmax())
-        if share[dof] > LARGE_SHARE:
-            yield (
-                "the model does not describe the robot: that is "
-                f"{100.0 * share[dof]:.0f} % of the effort limit of "
-                f"{rollout.meta['robot']['dofs'][dof]}; is there a load, or a contact?"
-            )
-            if not rollout.meta["robot"].get("rotors", True):
-                yield "the model has no rotors: robot: motor_inertia adds them"
+    share = _share_of_limit(rollout, "effort", size)
+    speeds = rollout.columns.get(VELOCITY, np.zeros((1, len(size))))
+    fast = _share_of_limit(rollout, "velocity", np.nanmax(speeds, axis=0))
+    dof, fastest = int(share.argmax()), int(fast.argmax())
+    names = rollout.meta["robot"]["dofs"]
+    if share[dof] > LARGE_SHARE:
+        yield (
+            "the model does not describe the robot: that is "
+            f"{100.0 * share[dof]:.0f} % of the effort limit of {names[dof]}; is there "
+            "a load, or a contact?"
+        )
+    elif fast[fastest] > FAST:
+        yield (
+            f"the model does not describe the robot: {names[fastest]} is beyond a "
+            "speed limit that it would keep; is there a load, or a contact?"
+        )
+    else:
+        return
+    if not rollout.meta["robot"].get("rotors", True):
+        yield "the model has no rotors: robot: motor_inertia adds them"
+
+
+def _share_of_limit(rollout: Log, kind: str, size: Array) -> Array:
+    """Return sizes over limits by joint, shape (nv,); zero where there is none."""
+    limits = np.array(rollout.meta["limits"].get(kind, []), dtype=float)
+    if len(limits) != len(size):
+        return np.zeros(len(size))
+    return np.asarray(size / np.where(limits > 0.0, limits, np.inf))  # NaN: none
 
 
 def limit_rows(rollout: Log) -> Iterator[str]:

@@ -71,6 +71,14 @@ def test_a_run_reports_unexplained_efforts() -> None:
     assert not [*unexplained_rows(load_experiment(CONFIG).run())]
 
 
+def test_a_speed_beyond_its_limit_shows_that_the_model_is_wrong() -> None:
+    log = load_experiment(CONFIG | {"plant": LOAD}).run()
+    log.columns["velocity_excess"][5, 6] = 0.2 * log.meta["limits"]["velocity"][6]
+    _, reported, remedy = unexplained_rows(log)
+    assert "panda_joint7 is beyond a speed limit that it would keep" in reported
+    assert "motor_inertia" in remedy
+
+
 def test_a_safe_stop_keeps_an_observer_s_findings() -> None:
     """Every live run once printed "up to nan N·m", and never warned of a large load."""
     beside = {**LOAD, "payload": {**LOAD["payload"], "center": [0.15, 0.0, 0.0]}}

@@ -91,6 +91,23 @@ def test_a_task_that_goes_is_summarised_by_the_rows_in_which_it_was_there() -> N
     assert undefined == {"manipulability.min"}
 
 
+def test_a_field_beyond_the_limits_is_named_also_where_the_task_takes_most_of_it() -> (
+    None
+):
+    robot = hsp.Robot.load("panda")
+    q = robot.home()
+    rows = robot.state(0.0, q, np.zeros(7)).frame("panda_tcp").jacobian
+    along = rows[0] / np.linalg.norm(rows[0])
+    g = 1e4 * along + 2e3 * np.linalg.svd(rows)[2][-1]  # P g is a fifth of it
+    field = hsp.fields.FunctionField(lambda state: g)
+    controller = hsp.Controller(robot, [hsp.FramePose(name="hand")], field)
+    run = hsp.simulate(controller, q, duration=0.3, control_period=1e-3)
+    said = "the field demands more than the limits allow: |g| 1.02e+04 rad/s"
+    assert said in run_summary.beyond_limits(run)
+    run.columns["field.g"][:] = 0.0  # then it is what the limits leave that moves
+    assert run_summary.beyond_limits(run) == ""
+
+
 def test_distances_of_barriers_are_in_log_output_and_summary() -> None:
     run = damped_run()
     assert run.meta["columns"]["distance.self_distance"]["minimum"] == 0.01
@@ -150,7 +167,7 @@ def test_a_field_demands_more_than_the_limits_allow_where_they_bind_to_the_end()
     assert last > 1
     run["field.g"][-1] = 0.0
     run["field.g"][-1, 0] = 2.0
-    run["null_space_norm"][-1] = 1.5
+    run["null_space_norm"][-1], run["v"][-1] = 1.5, 0.1
     for status in (2.0, 4.0):  # limited, beyond
         run["status"][:] = 0.0
         run["status"][-last:] = status
@@ -158,3 +175,5 @@ def test_a_field_demands_more_than_the_limits_allow_where_they_bind_to_the_end()
         assert "demands more than the limits allow: |g| 2" in text
         run["status"][-last] = 0.0
         assert run_summary.beyond_limits(run) == ""
+    run["status"][-last:], run["v"][-1] = 2.0, 1.0  # |v| = 2.6: most is followed
+    assert run_summary.beyond_limits(run) == ""
