@@ -285,8 +285,9 @@ class LiveRun:
                 else:
                     self.log.controller_failed = True
                     self.stop("operator", reason)
-            except BaseException as error:  # the effort to send is unknown
-                self.silent = self.done = True
+            except BaseException as error:  # of a signal's handler, or of this loop
+                if self.phase != Phase.RUNNING:  # again: the robot must stop
+                    self.silent = self.done = True
                 self.fail(error)
 
     def abandon(self, request: BaseException) -> None:

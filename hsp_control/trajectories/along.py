@@ -314,8 +314,7 @@ class AlongPose(PoseTrajectory, type="along_pose"):
 
     def sample(self, t: float, out: PoseSample | None = None) -> PoseSample:
         """Return the pose at time t; see `PoseTrajectory.sample`."""
-        if out is None:
-            out = PoseSample.allocate()
+        out = self._output(out)
         engine.AlongPose(**self._call().arguments, out=out)(float(t))
         return out
 

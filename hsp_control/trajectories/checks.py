@@ -1,11 +1,16 @@
 """Checks of the arguments of trajectories, which return new, checked copies."""
 
+from typing import TypeVar
+
 import numpy as np
 from numpy.typing import ArrayLike
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.errors import TrajectoryError
+from hsp_control.common.errors import ShapeError, TrajectoryError
+from hsp_control.declaration.language import kind
 from hsp_control.declaration.rotation import matrix_of
+
+Sample = TypeVar("Sample")
 
 _ORTHONORMAL = 1e-8  # largest entry of A Aᵀ - I that may be rounding error
 
@@ -28,6 +33,14 @@ def array(value: ArrayLike, name: str, shape: tuple[int | None, ...]) -> Array:
     if not np.isfinite(result).all():
         raise TrajectoryError(f"{name} must be finite; {name} = {result.tolist()}")
     return result
+
+
+def output(out: object, sample: type[Sample], size: str = "") -> Sample:
+    """Return ``out``, which is to be a sample, of ``size``."""
+    if not isinstance(out, sample):
+        needs = f"{sample.__name__}.allocate({size})"
+        raise ShapeError(f"out is {kind(out)}; needs {needs}")
+    return out
 
 
 def waypoint_times(value: ArrayLike, count: int) -> Array:

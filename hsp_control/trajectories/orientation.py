@@ -112,7 +112,9 @@ class OrientationTrajectory(Part, ABC, family="orientations", error=TrajectoryEr
                 f"{type(self).__name__} has no rotation: it is that in which the robot "
                 "starts, which only a controller knows; give rotation, or `anchored`"
             )
-        return OrientationSample.allocate() if out is None else out
+        if out is None:
+            return OrientationSample.allocate()
+        return checks.output(out, OrientationSample)
 
 
 class OrientationPath(OrientationTrajectory, type="path"):

@@ -256,8 +256,7 @@ class PolylinePose(PoseTrajectory, type="polyline_pose"):
                 "PolylinePose depends on where the robot starts, which only a "
                 "controller knows; give rotations, and waypoints in the world"
             )
-        if out is None:
-            out = PoseSample.allocate()
+        out = self._output(out)
         engine.AlongPose(**self._call().arguments, out=out)(float(t))
         return out
 

@@ -18,6 +18,7 @@ from hsp_control.declaration.quantities import Number, Positive, Vector3, number
 from hsp_control.declaration.rotation import AnyRotation, Rotation, matrix_of
 from hsp_control.engine.plans import TIME, PartCall, PartCalls, implemented_by
 from hsp_control.engine.rotations import jlog3, log3
+from hsp_control.trajectories import checks
 from hsp_control.trajectories.arc_length import Course
 from hsp_control.trajectories.hold import Hold, HoldOrientation
 from hsp_control.trajectories.orientation import (
@@ -95,6 +96,12 @@ class PoseTrajectory(Part, ABC, family="poses", error=TrajectoryError):
             ``out``, or the new sample.
         """
 
+    def _output(self, out: PoseSample | None) -> PoseSample:
+        """Return ``out``, or a new sample if it is None."""
+        if out is None:
+            return PoseSample.allocate()
+        return checks.output(out, PoseSample)
+
     def calls(self, out: PoseSample) -> PartCalls:
         """Return the calls that write ``out`` at a time; see `Trajectory.calls`."""
         return [PartCall(write_sample, sampler=self.sample, out=out, t=TIME)]
@@ -145,8 +152,7 @@ class ComposedPose(PoseTrajectory, type="composed"):
 
     def sample(self, t: float, out: PoseSample | None = None) -> PoseSample:
         """Return the pose at time t; see `PoseTrajectory.sample`."""
-        if out is None:
-            out = PoseSample.allocate()
+        out = self._output(out)
         self.position.sample(t, out.position)
         self.orientation.sample(t, out.orientation)
         return out
@@ -276,8 +282,7 @@ class ScrewInterpolation(PoseTrajectory, type="screw"):
 
     def sample(self, t: float, out: PoseSample | None = None) -> PoseSample:
         """Return the pose at time t; see `PoseTrajectory.sample`."""
-        if out is None:
-            out = PoseSample.allocate()
+        out = self._output(out)
         engine.Screw(**self._call.arguments, out=out)(float(t))
         return out
 

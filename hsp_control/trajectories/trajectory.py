@@ -12,6 +12,7 @@ from hsp_control.common.arrays import Array
 from hsp_control.common.errors import ShapeError, TrajectoryError
 from hsp_control.declaration import Part
 from hsp_control.engine.plans import TIME, PartCall, PartCalls, bind, implemented_by
+from hsp_control.trajectories import checks
 from hsp_control.trajectories.arc_length import Course
 
 
@@ -198,6 +199,7 @@ class Trajectory(Part, ABC, family="trajectories", error=TrajectoryError):
         n = self.dimension
         if out is None:
             return TrajectorySample.allocate(n)
+        checks.output(out, TrajectorySample, f"{n}")
         if len(out.position) != n:
             raise ShapeError(
                 f"out has dimension {len(out.position)}; "

@@ -86,6 +86,7 @@ def completed(
         _add_frame(model, name, tool)
     if gravity is not None:
         model.gravity.linear = np.asarray(gravity)
+    _check_order(model, source)
     _check_limits(model, source)
     _check_mass_matrix(model, source)
     return model
@@ -310,6 +311,24 @@ def _check_limits(model: pin.Model, source: RobotSource) -> None:
                     f"{source.urdf}: joint {name!r}: its lower limit {lower:g} is "
                     f"above its upper limit {upper:g}"
                 )
+
+
+def _check_order(model: pin.Model, source: RobotSource) -> None:
+    """Check that the joints below each joint follow it without a gap.
+
+    Pinocchio's CRBA takes that for granted: M would be wrong (seen with 4.1).
+    """
+    around = [0]  # the joints from the root to the last one
+    for index in range(1, model.njoints):
+        parent = model.parents[index]
+        if parent not in around:
+            last = model.names[index - 1]
+            raise ModelError(
+                f"{source.urdf}: joint {model.names[index]!r} follows {last!r}, but is "
+                f"below {model.names[parent]!r}, which {last!r} is not: its mass "
+                "matrix would be wrong; add all joints below a joint before others"
+            )
+        around = [*around[: around.index(parent) + 1], index]
 
 
 def _check_mass_matrix(model: pin.Model, source: RobotSource) -> None:

@@ -38,7 +38,8 @@ def write_planar_axes(robot: Element) -> None:
         origin.set("rpy", _text(pin.rpy.rpyToMatrix(*rpy) @ turn))
         name = f"{joint.get('name', '')}.plane"
         SubElement(robot, "link", name=name)
-        back = SubElement(robot, "joint", name=name, type="fixed")
+        # of its own: a frame is looked up by its name where joints are locked
+        back = SubElement(robot, "joint", name=f"{name}_back", type="fixed")
         SubElement(back, "parent", link=name)
         SubElement(back, "child", link=child.get("link", ""))
         SubElement(back, "origin", rpy=_text(turn.T))

@@ -69,7 +69,6 @@ class FollowedPose(FollowedStream, PoseTrajectory):
 
     def sample(self, t: float, out: PoseSample | None = None) -> PoseSample:
         """Return the pose at time t; see `PoseTrajectory.sample`."""
-        if out is None:
-            out = PoseSample.allocate()
+        out = self._output(out)
         self._write(t, out)
         return out

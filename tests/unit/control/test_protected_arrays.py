@@ -20,6 +20,7 @@ from hsp_control.common.errors import (
     ControllerError,
     ImmutableError,
     ModelError,
+    ShapeError,
     TaskError,
 )
 from hsp_control.constraints.limits.barriers import Barrier
@@ -35,6 +36,7 @@ from hsp_control.null_space.metrics import Metric
 from hsp_control.robot import RobotState
 from hsp_control.tasks import Task
 from hsp_control.tasks.feedback import ErrorPart, Feedback
+from hsp_control.trajectories import HoldOrientation, HoldPose
 
 FRAME = "panda_tcp"
 NV = 7
@@ -441,7 +443,33 @@ def test_arrays_of_a_frame_cannot_be_replaced() -> None:
             setattr(own.state.frame(FRAME), name, np.zeros((6, NV)))
 
 
+def test_no_array_that_a_hook_reaches_can_be_written() -> None:
+    own = controller()
+    own.compute(0.0, own.robot.home(), np.full(NV, 0.1))
+    shown = own.state.read_only
+    reached = {name: getattr(shown, name) for name in dir(shown) if name[0] != "_"}
+    reached |= shown.world._asdict() | {"frame.jacobian": shown.frame(FRAME).jacobian}
+    arrays = {n: each for n, each in reached.items() if isinstance(each, np.ndarray)}
+    assert {"q", "v", "mass_matrix", "placements", "jacobian_dot"} <= arrays.keys()
+    assert [name for name, each in arrays.items() if each.flags.writeable] == []
+
+
 # -- out= ------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("sample", "needs"),
+    [
+        (hsp.Hold([1.0, 2.0, 3.0]).sample, r"TrajectorySample.allocate\(3\)"),
+        (HoldOrientation([0.0, 0.0, 0.0]).sample, r"OrientationSample.allocate\(\)"),
+        (HoldPose([0.0] * 3, [0.0] * 3).sample, r"PoseSample.allocate\(\)"),
+    ],
+)
+def test_a_sample_of_another_kind_is_one_error(
+    sample: Callable[..., object], needs: str
+) -> None:
+    with pytest.raises(ShapeError, match=f"out is an int; needs {needs}"):
+        sample(0.0, 3)
 
 
 def test_a_sample_of_another_size_is_one_error() -> None:

@@ -46,6 +46,7 @@ from hsp_control.live import (
     StopSettings,
     run_loop,
 )
+from hsp_control.live.loop import LiveRun
 from hsp_control.live.state_reader import FrozenState, MeasurementMonitor
 from hsp_control.robot import RobotState
 from hsp_control.trajectories.trajectory import TrajectorySample
@@ -634,6 +635,32 @@ def test_a_second_signal_leaves_it_to_the_robot() -> None:
     assert report.ended == "operator"
     assert report.silent
     assert robot.robot.phase is Phase.HOLDING
+
+
+class OutOfTime(BaseException):
+    """What a signal's handler may raise, at any place in a period."""
+
+
+@pytest.mark.parametrize("times", [1, 2])
+def test_what_a_handler_raises_in_the_middle_of_a_period_ends_in_the_safe_stop(
+    times: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A second one, in the stop, leaves it to the robot."""
+    robot, raised, period = rig(), list[float](), LiveRun.check_applied_effort
+
+    def raising(run: LiveRun) -> None:
+        period(run)
+        if run.reader.state.t > 0.05 and len(raised) < times:
+            raised.append(run.reader.state.t)
+            raise OutOfTime("time limit")
+
+    monkeypatch.setattr(LiveRun, "check_applied_effort", raising)
+    report = run_loop(law(), robot, settings=SETTINGS)
+    assert (report.ended, report.reason) == ("fault", "OutOfTime: time limit")
+    assert isinstance(report.error, OutOfTime)
+    assert report.silent is (times == 2)
+    if times == 1:
+        assert_safe(robot, report)
 
 
 # --- the report ----------------------------------------------------------------------

@@ -143,3 +143,32 @@ def chain_of_screws() -> pin.Model:
         parent = model.addJoint(parent, joint, place, f"screw{k + 1}")
         model.appendBodyToJoint(parent, pin.Inertia.FromSphere(1.0, 0.1), place)
     return model
+
+
+def tree(order: str) -> pin.Model:
+    """Return joints a, b beside it, and c on a, added in some order."""
+    model, added, below = pin.Model(), {"": 0}, {"a": "", "b": "", "c": "a"}
+    for name in order:
+        place = pin.SE3(np.eye(3), np.array([0.1, 0.0, 0.3]))
+        parent = added[below[name]]
+        added[name] = model.addJoint(parent, pin.JointModelRY(), place, name)
+        body = pin.Inertia.FromBox(1.0, 0.3, 0.2, 0.1)
+        model.appendBodyToJoint(added[name], body, place)
+        model.addBodyFrame(f"link_{name}", added[name], pin.SE3.Identity(), 0)
+    return model
+
+
+@pytest.mark.parametrize("order", ["acb", "bac"])
+def test_joints_of_a_tree_in_their_order_have_the_right_mass_matrix(order: str) -> None:
+    robot = Robot.from_pinocchio(tree(order))
+    q, rest = np.full(3, 0.3), np.zeros(3)
+    held = robot.inverse_dynamics(q, rest, rest)
+    columns = [robot.inverse_dynamics(q, rest, a) - held for a in np.eye(3)]
+    np.testing.assert_allclose(robot.mass_matrix(q), np.array(columns).T, atol=1e-14)
+
+
+def test_joints_between_others_and_what_is_below_them_are_refused() -> None:
+    """Pinocchio's CRBA would leave out the inertia between a and c."""
+    message = "joint 'c' follows 'b', but is below 'a', which 'b' is not"
+    with pytest.raises(ModelError, match=message):
+        Robot.from_pinocchio(tree("abc"))

@@ -65,6 +65,7 @@ def test_a_planar_joint_moves_in_the_plane_of_its_axis(
         )
     )  # fmt: skip
     robot = Robot.load(path)
+    assert Robot.load(path, locked={"arm": 0.1}).nv == robot.nv - 1
     place = pin.SE3(pin.rpy.rpyToMatrix(0.3, 0.2, 0.1), np.array([0.5, 0.1, 0.2]))
 
     def of(frame: str, q: Array) -> pin.SE3:
