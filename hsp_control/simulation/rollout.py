@@ -260,7 +260,8 @@ def _read_journal(path: Path) -> tuple[dict[str, Array], dict[str, Any]]:
     if not reader.ended:
         meta = {**meta, "status": "interrupted", "message": KILLED}
     if damaged := reader.damaged + reader.ends_damaged():
-        lost = f"{damaged} damaged rows of the journal are left out"
+        which = "row of the journal is" if damaged == 1 else "rows of the journal are"
+        lost = f"{damaged} damaged {which} left out"
         _log.warning("%s: %s", path, lost)
         meta = {**meta, "damaged": damaged}
         meta["message"] = "; ".join(filter(None, (meta.get("message"), lost)))

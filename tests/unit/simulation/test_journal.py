@@ -183,7 +183,7 @@ def test_a_damaged_row_is_reported(
     path.write_bytes(bytes(spoilt))
     read = Rollout.load(path)
     assert read.status == rollout.status
-    assert read.meta["message"] == "1 damaged rows of the journal are left out"
+    assert read.meta["message"] == "1 damaged row of the journal is left out"
     assert len(read) == len(rollout) - 1
     assert set(read.t) < set(rollout.t)
 
