@@ -488,7 +488,6 @@ class ReadOnlyState(SeenState):
     centroidal = property(lambda self: self._own.centroidal.shown)
     mass_matrix = property(lambda self: read_only_view(self._own.mass_matrix))
     time = property(lambda self: read_only_view(self._own.time))
-    stamp_array = property(lambda self: read_only_view(self._own.stamp_array))
     effort = property(lambda self: read_only_view(self._own.effort))
     world = property(
         lambda self: WorldKinematics(*map(read_only_view, self._own.world))
