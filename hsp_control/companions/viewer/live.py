@@ -89,7 +89,8 @@ class LiveView:
     def _send(self, recorder: LogWriter, now: float) -> None:
         # From the last sent row: tracks and bands continue there.
         rows = Rollout(recorder.rows(max(self._sent - 1, 0)), self._meta)
-        rate = float(rows.t[-1]) / max(now - (self._begin or 0.0), 1e-9)
+        simulated = float(rows.t[-1]) - self._experiment.scenario.simulation.start_time
+        rate = simulated / max(now - (self._begin or 0.0), 1e-9)
         # share of drawing = drawn rows per second of computing · time per row
         finest = max(COARSEST, rate * self._cost / DRAWING_SHARE)
         before = time.thread_time()
@@ -118,7 +119,7 @@ class LiveView:
         first = not self._pieces
         settings = self._experiment.scenario.simulation
         clip = Clip(
-            0.0,
+            settings.start_time,
             float(motion.times[-1]),
             list(self._run.tracks(motion)),
             settings.end_time,

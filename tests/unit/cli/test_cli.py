@@ -18,8 +18,8 @@ from places import ON_MUJOCO
 from wording import wording
 
 import hsp_control as hsp
-from hsp_control import NullSpaceField, Rollout, __version__
-from hsp_control.cli import doctor, main, options, robot_table
+from hsp_control import NullSpaceField, Rollout, __version__, load_experiment
+from hsp_control.cli import doctor, main, options, robot_table, stopwatch
 from hsp_control.cli.check import start_advice
 from hsp_control.cli.interrupts import DeferredInterrupt
 
@@ -485,3 +485,29 @@ def test_a_better_start_is_searched_for_poses(task: hsp.Task, better: bool) -> N
     assert lines[0].startswith("The tasks hand are singular at the start")
     assert ("A better start (smallest singular value" in "\n".join(lines)) == better
     assert "inf" not in "\n".join(lines)
+
+
+def test_the_speed_of_a_run_is_its_time_over_the_wall_time(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """From the first row on."""
+    clock = iter([10.0, 10.5, 12.0])
+    monkeypatch.setattr(stopwatch, "perf_counter", lambda: next(clock))
+    watch = stopwatch.Stopwatch()
+    for _ in range(3):
+        watch.lap()
+    assert watch.table_rows(Rollout({"t": np.array([1.0, 2.0, 9.0])}, {})) == [
+        ("speed", "4 times real time (8 s in 2 s, logging included)"),
+        ("log", "8 bytes per row, 2.4e-05 MB in memory"),
+    ]
+
+
+def test_check_prints_the_change_of_an_effort_in_a_millisecond(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    limits = load_experiment("panda_limits").controller.limits
+    assert limits is not None
+    (rate,) = set(limits.effort_rate)
+    assert main(["check", "panda_limits"]) == 0
+    text = " ".join(capsys.readouterr().out.split())
+    assert f"at most {1e-3 * rate:.2g} N·m or N in 1 ms" in text

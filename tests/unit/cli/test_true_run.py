@@ -1,6 +1,7 @@
 """The robot's log has the tasks that the loop followed, of the robot's own states."""
 
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any, NoReturn
 
 import numpy as np
@@ -17,6 +18,7 @@ from hsp_control.companions.viewer.packing import ArrayTable
 from hsp_control.companions.viewer.page_plots import pack_panels
 from hsp_control.live import InProcessRobot, Phase
 from hsp_control.live.live_log import live_channels
+from hsp_control.live.report import Deadlines
 from hsp_control.simulation.limit_excess import POSITION, VELOCITY, LimitExcess
 from hsp_control.simulation.log_writer import LogWriter
 
@@ -162,3 +164,40 @@ def test_the_robot_s_log_is_kept_whatever_is_raised_while_it_is_completed(
     np.testing.assert_array_equal(kept.q, run.q)
     assert not (tmp_path / "robot.journal").exists()
     assert f"has its states only: {type(raised).__name__}" in capsys.readouterr().out
+
+
+def test_the_later_phase_of_both_processes_is_logged() -> None:
+    """The robot may stop by itself, and holds on when the loop has ended."""
+    experiment = hsp.load_experiment(CONFIG)
+    run = hsp.load_experiment(CONFIG).run()
+    rows = np.arange(len(run))
+    loop = np.select([rows < 10, rows < 20], [Phase.RUNNING, Phase.DAMPING], 3.0)
+    own = np.select([rows < 5, rows < 8], [Phase.RUNNING, Phase.HOLDING], 1.0)
+    truth = states_only(run, experiment)
+    truth.columns["live.phase"][:] = own
+    both = Rollout({**run.columns, "live.phase": loop}, run.meta)
+    made = with_tasks(truth, both, experiment)["live.phase"]
+    np.testing.assert_array_equal(made, np.maximum(loop, own))
+
+
+def test_injected_faults_are_those_of_the_packets_sender() -> None:
+    """States are the robot's packets, efforts are ours."""
+    kinds = ("sent", "accepted", "lost", "stale", "duplicated", "corrupted", "foreign")
+    counts, theirs = dict.fromkeys(kinds, 0), dict.fromkeys(kinds, 0)
+    robot = {"link": theirs, "injected": {"lost": 2, "late": 3}}
+    table = live._packets(counts, {"lost": 5, "late": 7}, robot)
+    rows = {
+        row[0]: row[3:5] for row in zip(*(c.cells for c in table.columns), strict=True)
+    }
+    assert rows["  injected, states"] == ("2", "3")
+    assert rows["  injected, efforts"] == ("5", "7")
+
+
+def test_times_of_a_loop_are_printed_in_microseconds() -> None:
+    deadlines = Deadlines(0.001)
+    deadlines.add(interval=0.0012, response=0.00025)
+    report: Any = SimpleNamespace(deadlines=deadlines)
+    table = live._times(report, SimpleNamespace(name="mine"))  # type: ignore[arg-type]
+    heading, *numbers = table.columns
+    assert str(heading.header) == "mine at 1000 Hz, times in µs"
+    assert [list(each.cells) for each in numbers] == 4 * [["250", "1200"]]

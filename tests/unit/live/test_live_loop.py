@@ -375,3 +375,11 @@ def test_schedules_of_feet_use_the_controller_s_time() -> None:
     )
     LiveRun.feel_ground(run)
     assert requested == [7.2]
+
+
+def test_the_first_reason_to_stop_is_kept() -> None:
+    """Those after it are its consequences."""
+    requests = OperatorRequests()
+    requests.stop("the door is open")
+    requests.stop("the page has ended", fault=True)
+    assert (requests.reason, requests.fault) == ("the door is open", False)

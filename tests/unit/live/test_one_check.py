@@ -5,10 +5,12 @@ import pytest
 from live_rigs import PERIOD, gravity, start
 from loaded_robots import panda
 
+from hsp_control import Robot
 from hsp_control.common.arrays import Array, Flags
 from hsp_control.live import LiveSettings, Measurement
 from hsp_control.live.expected_motion import ExpectedMotion
 from hsp_control.live.reaction_check import ReactionCheck
+from hsp_control.live.still_sensors import StillSensors
 from hsp_control.live.trusted_motion import TrustedMotion
 from hsp_control.live.velocity_check import VelocityCheck
 
@@ -188,3 +190,21 @@ def test_one_noisy_velocity_of_a_braked_joint_is_no_acceleration() -> None:
     faults = [motion.update(0.6, 0.6) for _ in range(10)]  # the others are at rest
     (found,) = filter(None, faults)
     assert "panda_joint7 is braked, and moves at 0.6 rad/s" in found
+
+
+def test_after_a_restart_a_quiet_sensor_is_not_one_whose_noise_has_vanished() -> None:
+    robot, rng = Robot.load("panda"), np.random.default_rng(1)
+    q, rest = robot.home(), np.zeros(7)
+    tau = robot.inverse_dynamics(q, rest, rest)
+    sensors = StillSensors(robot, LiveSettings(), np.full(7, 87.0), 0.001)
+    for restarted in (False, True):
+        for k in range(1000):
+            noise = 1e-5 * (-1.0) ** k * rng.uniform(0.5, 1.5, 7)
+            sensors.update(noise, noise, rest, 0.001)
+        if restarted:
+            sensors.restart()
+        for _ in range(100):
+            sensors.update(rest, rest, rest, 0.001)
+        sensors.judge(q, rest, tau)
+        assert sensors.dead.all() == (not restarted)
+        assert sensors.dead.any() == (not restarted)

@@ -93,3 +93,11 @@ def test_a_planar_joint_moves_in_the_plane_of_its_axis(
         rtol=0,
         atol=1e-12,
     )
+
+
+def test_a_continuous_joint_has_no_soft_limits(write: Write) -> None:
+    """As it has none: those of the text may even contradict each other."""
+    text = ARM.replace('"shoulder" type="revolute"', '"shoulder" type="continuous"')
+    robot = Robot.load(write(text.replace("</joint>", soft(8.0, 9.0), 1)))
+    lower, upper = robot.position_limits()
+    assert (lower[0], upper[0]) == (-np.inf, np.inf)

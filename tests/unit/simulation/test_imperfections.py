@@ -579,3 +579,13 @@ REFUSED: list[tuple[Callable[[], object], str]] = [
 def test_imperfections_that_are_none(make: Any, message: str) -> None:
     with pytest.raises(SimulationError, match=wording(message)):
         make()
+
+
+def test_a_reset_forgets_the_effort_that_acted() -> None:
+    """The first one of a run acts at once, however late a drive is."""
+    spy = Spy(load("panda"))
+    plant = ImperfectPlant(spy, drives=[Jitter(1e9)])
+    for effort in (1.0, 2.0):
+        plant.reset(0.0, spy.robot.neutral(), np.zeros(7))
+        plant.advance(0.0, 1.0, np.full(7, effort))
+        assert spy.calls == [(0.0, 1.0, effort)]

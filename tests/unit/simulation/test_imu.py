@@ -125,3 +125,12 @@ def test_noise_and_biases_have_the_sizes_that_were_declared():
     ]
     low, high = chi2.ppf([1e-4, 1.0 - 1e-4], 300)
     assert low < np.square(first).sum() / 0.25 < high
+
+
+def test_the_bias_of_the_accelerometer_walks_as_declared():
+    q, n = Robot.load("solo12").home(), 1000
+    states = [(k * H, q, np.zeros(18)) for k in range(n + 1)]
+    walk = SILENT | {"accelerometer_walk": 1e-2}
+    force = [each.specific_force for each in readings(Imu("base_link", **walk), states)]
+    low, high = chi2.ppf([1e-4, 1.0 - 1e-4], 3 * n)
+    assert low < np.square(np.diff(force, axis=0)).sum() / (H * 1e-2**2) < high

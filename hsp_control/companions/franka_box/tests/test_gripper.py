@@ -77,3 +77,18 @@ def test_who_leaves_during_a_motion_makes_room(served: Gripper) -> None:
         made.settimeout(60.0)
         assert asked(made, CONNECT, struct.pack("<HH", 3, 0)) == 0
     assert served.width > 0.07
+
+
+@pytest.mark.parametrize(("thing", "held"), [(0.045, True), (0.055, False)])
+def test_a_grasp_holds_what_is_wider_by_less_than_its_outer_tolerance(
+    served: Gripper, thing: float, held: bool
+) -> None:
+    served.thing = thing
+    try:
+        with closing(client()) as made:
+            asked(made, CONNECT, struct.pack("<HH", 3, 0))
+            asked(made, MOVE, struct.pack("<2d", 0.08, 10.0))
+            grasp = struct.pack("<5d", 0.03, 0.005, 0.02, 10.0, 30.0)
+            assert (asked(made, GRASP, grasp) == 0) == held
+    finally:
+        served.thing = 0.0

@@ -381,3 +381,12 @@ def test_mujoco_carries_the_payload_of_a_time_line() -> None:
     there = [robot.state(0.0, each, rest).position("panda_tcp") for each in run.q]
     # With the previous bodies the hand sags by 20 mm.
     np.testing.assert_allclose(there, [there[0]] * len(there), rtol=0.0, atol=1e-9)
+
+
+def test_the_clock_of_mujoco_is_that_of_the_run() -> None:
+    """Also of one that does not start at 0, as its users' callbacks see it."""
+    robot = Robot.load("panda")
+    plant, rest = MujocoPlant(robot, Mujoco()), np.zeros(7)
+    plant.reset(2.0, robot.home(), rest)
+    plant.advance(2.0, 2.003, rest)
+    assert plant.data.time == pytest.approx(2.003)

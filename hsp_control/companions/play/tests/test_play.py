@@ -14,7 +14,7 @@ from wording import wording
 import hsp_control as hsp
 from hsp_control.common.arrays import Array
 from hsp_control.common.errors import ConfigError
-from hsp_control.companions.play import Session, play
+from hsp_control.companions.play import Session, play, real_time
 from hsp_control.companions.play.knobs import _scaled, knobs_of
 from hsp_control.companions.play.other_law import PLAIN, OtherLaw
 from hsp_control.companions.play.plain_impedance import PlainImpedance, feedback_of
@@ -664,3 +664,72 @@ def test_any_exception_of_a_page_s_change_ends_the_run_and_not_the_session(
     session.reset()
     go(session, 0.05)
     assert not session.over
+
+
+def test_a_start_out_of_reach_is_reported_after_each_reset() -> None:
+    """0.3 s after it: a picture forgets when errors of the run before moved last."""
+    tip = {"type": "frame_position", "axes": "xy",
+           "trajectory": {"type": "hold", "point": [4.0, 0.0]}}  # fmt: skip
+    session = Session(playable({
+        "robot": {"name": "planar3r"}, "tasks": {"tip": tip},
+        "start": {"joints": dict.fromkeys(("joint1", "joint2", "joint3"), 0.0)},
+    }))  # fmt: skip
+    recorder = Recorder()
+    picture = Picture(session, Viewer(session.robot, transport=recorder))
+
+    def said(seconds: float) -> str:
+        for _ in range(round(seconds / session.row)):
+            session.advance()
+            picture.draw(running=True, rate=1.0)
+        return str(reported(recorder, "/play", "targets")["away"].get("tip", ""))
+
+    assert said(0.5).startswith("target out of reach")
+    session.receive(
+        {"do": "move", "target": "tip", "pose": [2.0, 1.0, 0.0, 0, 0, 0, 1]}
+    )
+    said(1.5)
+    session.reset()
+    picture.begin()
+    assert said(0.5).startswith("target out of reach")
+
+
+def test_joints_are_shown_as_shares_of_their_own_limits(session: Session) -> None:
+    recorder = Recorder()
+    picture = Picture(session, Viewer(session.robot, transport=recorder))
+    for _ in range(20):
+        session.advance()
+    picture.draw(running=True, rate=1.0)
+    shown, limits = reported(recorder, "/play", "joints"), session.controller.limits
+    q, v, tau = (
+        session.rollout()[name][-1] for name in ("joint_positions", "v", "tau")
+    )
+    assert limits is not None
+    inside = (q - limits.lower) / (limits.upper - limits.lower)
+    shares = {"q": inside, "v": v / limits.velocity, "tau": tau / limits.effort}
+    for name, expected in shares.items():
+        np.testing.assert_allclose(shown[name], expected, atol=1e-4)
+
+
+class Clocked:
+    """A session and its picture, whose time is the clock's; it records the rate."""
+
+    t, row, over = 0.0, 0.01, ""
+    rate = 0.0
+
+    def advance(self) -> None:
+        self.t += self.row
+
+    def draw(self, *, running: bool, rate: float) -> None:
+        self.rate = rate
+
+
+def test_the_rate_that_is_shown_is_that_of_the_last_second(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    clock: list[float] = [5.0]
+    monkeypatch.setattr(real_time, "monotonic", lambda: clock[-1])
+    monkeypatch.setattr(real_time, "sleep", lambda s: clock.append(clock[-1] + s))
+    both: Any = Clocked()
+    for end in (2.5, 5.5):
+        play(both, both, list, str, end=lambda end=end: both.t > end)
+        assert both.rate == pytest.approx(1.0, abs=0.05)

@@ -345,3 +345,18 @@ def test_a_gap_does_not_make_a_curve_vary() -> None:
     values[:, 1] = np.nan
     values[:, 2] = [5.0, -np.inf, 5.0]
     assert log_series.lively(values) == expected
+
+
+def test_the_power_of_a_matrix_gain_is_the_fall_of_V_in_the_metric() -> None:
+    robot = Robot.load("planar3r", gravity=(0, 0, 0))
+    task = FramePosition("tip", Round(1, 3, [1, 1]), gains=GAINS, axes="xy")
+    q0 = robot.integrate(robot.neutral(), np.array([-0.44, 0.9, 0.9]))
+    controller = Controller(
+        robot, [task], Rest(), null_space_gain=[5.0, 10.0, 15.0],
+        metric=CoordinatesMetric(A),
+    )  # fmt: skip
+    run = simulate(controller, q0, [1.0, 0.0, -1.0], duration=0.3)
+    V, power = 0.5 * run["null_space_norm"] ** 2, decay_power(run)
+    assert power is not None
+    fall = -V * np.gradient(np.log(V), run.t)
+    np.testing.assert_allclose(power[1:-1], fall[1:-1], rtol=0.01)

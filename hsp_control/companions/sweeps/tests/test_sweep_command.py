@@ -2,13 +2,18 @@
 
 import sys
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
 from sweep_runs import MOVING, OVER, QUICK
 
 import hsp_control as hsp
 from hsp_control.cli import main
 from hsp_control.common.errors import SweepError
+from hsp_control.companions.sweeps import Sweep
+from hsp_control.companions.sweeps.sensitivities import influences
+from hsp_control.companions.sweeps.sweep_command import _spread
 
 
 @pytest.mark.parametrize(("arguments", "message"), [
@@ -116,3 +121,19 @@ def test_a_stream_from_another_process_cannot_be_swept() -> None:
     received = "tasks.tip.trajectory={type: stream, source: 'udp://127.0.0.1:5005'}"
     with pytest.raises(SweepError, match=r"listens to udp:.*, which only one"):
         hsp.sweeps.sweep(MOVING, OVER, overrides=[*QUICK, received])
+
+
+def test_the_worst_run_has_the_least_distance_or_the_largest_effort() -> None:
+    """Of the completed ones, by its number."""
+    columns: dict[str, Any] = {
+        "run": np.array([3, 5, 6, 8]),
+        "status": np.array([*3 * ["completed"], "diverged"], dtype=object),
+        "distance.ball.min": np.array([0.3, 0.1, 0.2, 0.0]),
+        "effort.max": np.array([7.0, 1.0, 9.0, 99.0]),
+    }
+    names = list(columns)[2:]
+    about = {"unit": "m", "meaning": "a number"}
+    meta = {"parameters": {}, "metrics": dict.fromkeys(names, about)}
+    swept = Sweep(columns, meta)
+    *_, worst = _spread(swept, influences(swept, names)).columns
+    assert list(worst.cells) == ["5", "6"]

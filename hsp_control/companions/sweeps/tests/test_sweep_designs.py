@@ -7,15 +7,19 @@ from typing import Any
 
 import numpy as np
 import pytest
+from matplotlib.colors import to_hex
+from matplotlib.figure import Figure
 from places import further
 from scipy import stats
 from scipy.special import ndtr, ndtri
 
 from hsp_control.common.errors import PlotError, SweepError
 from hsp_control.companions import sweeps
+from hsp_control.companions.plots import palette
 from hsp_control.companions.sweeps import Sweep, row_files
 from hsp_control.companions.sweeps.design import chosen_design, points
 from hsp_control.companions.sweeps.factor import factors
+from hsp_control.companions.sweeps.figure import _tint
 from hsp_control.companions.sweeps.one_run import Row
 from hsp_control.companions.sweeps.plan import SweepPlan
 from hsp_control.companions.sweeps.row_files import RowFiles
@@ -400,3 +404,16 @@ def test_two_or_three_values_give_a_figure_too(runs: int) -> None:
     assert not any(each.get_title(loc="left") for each in figure.axes)
     with pytest.raises(SweepError, match=f"{runs} runs were completed"):
         sweeps.sensitivity(Sweep(few, whole.meta))
+
+
+@pytest.mark.parametrize(("correlation", "hue"), [
+    (0.9, palette.ACTUAL), (-0.9, palette.DESIRED),
+    (0.2, palette.FIELD), (-0.2, palette.FIELD), (float("nan"), palette.FIELD),
+])  # fmt: skip
+def test_a_tint_tells_rising_falling_and_other_influences(
+    correlation: float, hue: str
+) -> None:
+    axes = Figure().add_subplot()
+    _tint(axes, correlation, 0.8, noise=0.1)
+    expected = palette.blend(palette.PAPER, hue, 0.45 * 0.8)
+    assert to_hex(axes.get_facecolor()) == to_hex(expected)

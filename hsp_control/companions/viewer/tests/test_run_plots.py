@@ -6,7 +6,7 @@ import pytest
 from hsp_control import Rollout, load_experiment
 from hsp_control.companions.viewer import ComparedRun, InlineView, SceneRecorder, Viewer
 from hsp_control.companions.viewer.commands import PLOTS, key_of, unpack
-from hsp_control.companions.viewer.live_plots import Curve
+from hsp_control.companions.viewer.live_plots import Curve, live_plots
 from hsp_control.companions.viewer.page_plots import (
     PREVIEW_ROWS,
     plots_of,
@@ -72,3 +72,14 @@ def test_a_share_of_a_limit_has_no_sign() -> None:
     curve = Curve("largest", "v", slice(0, 3), np.array([1.0, 2.0, np.inf]))
     rows = {"t": np.arange(3.0), "v": np.array([[-0.9, 1.0, 9.0], [0.1, -1.0, -9.0]])}
     np.testing.assert_allclose(curve.values(rows), [90.0, 50.0])
+
+
+def test_each_part_of_an_error_is_the_norm_of_its_own_rows() -> None:
+    """Of a pose: first the position's rows, then those of the orientation."""
+    run = load_experiment("panda_obstacle", "simulation.duration=0.02").run()
+    error = np.random.default_rng(1).standard_normal((len(run), 6))
+    rows = {**run.columns, "task.hand.error": error}
+    place, turn = (p for p in live_plots(rows, run.meta) if p.title == "Task error")
+    for plot, part in ((place, slice(3)), (turn, slice(3, 6))):
+        expected = np.linalg.norm(error[:, part], axis=1)
+        np.testing.assert_allclose(plot.curves[0].values(rows), expected)

@@ -1,5 +1,7 @@
 """The view's layers agree with the run, recomputed independently."""
 
+from time import thread_time
+from types import SimpleNamespace
 from typing import Any
 
 import coal
@@ -31,9 +33,12 @@ from hsp_control.companions.viewer.arrows import (
 )
 from hsp_control.companions.viewer.clearances import capsules, influence, zone
 from hsp_control.companions.viewer.commands import CAPTION, CLIP, unpack
-from hsp_control.companions.viewer.motion import motion_of
+from hsp_control.companions.viewer.comparison import Comparison
+from hsp_control.companions.viewer.motion import RunMotion, motion_of
 from hsp_control.companions.viewer.obstacles import _upward, obstacle
+from hsp_control.companions.viewer.robot_drawing import RobotDrawing
 from hsp_control.companions.viewer.run_drawing import LAYERS
+from hsp_control.companions.viewer.targets import growing_paths
 from hsp_control.geometry.shapes import (
     Box,
     Capsule,
@@ -569,10 +574,15 @@ class Watched(Recorder):
 
 
 @pytest.mark.slow
-def test_a_run_is_shown_while_it_is_computed(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("start", [0.0, 100.0])
+def test_a_run_is_shown_while_it_is_computed(
+    start: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(live, "MIN_PERIOD", 0.0)
     monkeypatch.setattr(live, "MAX_PERIOD", 0.0)
-    experiment = load_experiment(PLANAR, "simulation.duration=0.5")
+    experiment = load_experiment(
+        PLANAR, "simulation.duration=0.5", f"simulation.start_time={start}"
+    )
     transport = Watched()
     viewer = Viewer(experiment.robot, transport=transport)
     view = LiveView(viewer, experiment)
@@ -584,13 +594,14 @@ def test_a_run_is_shown_while_it_is_computed(monkeypatch: pytest.MonkeyPatch) ->
 
     clips = [command for command in transport.sent if command["type"] == "clip"]
     assert [clip["begins"] for clip in clips] == [True] + [False] * (len(clips) - 1)
-    assert all(clip["open"] and clip["horizon"] == 0.5 for clip in clips[:-1])
+    assert all(clip["open"] and clip["horizon"] == start + 0.5 for clip in clips[:-1])
+    assert {clip["start"] for clip in clips} == {start}
     printed = [c["text"] for c in transport.sent if c["type"] == "status"]
     assert any("× real time" in text for text in printed)
     times = np.concatenate([clip["clocks"][0] for clip in clips])
     # every piece begins at the end of the previous one
     assert (np.diff(times) >= 0.0).all()
-    assert (times[0], times[-1]) == (0.0, 0.5)
+    assert (times[0], times[-1]) == (start, start + 0.5)
     joint = np.concatenate(
         [
             np.reshape(track["values"], (-1, 4))
@@ -614,7 +625,7 @@ def test_a_run_is_shown_while_it_is_computed(monkeypatch: pytest.MonkeyPatch) ->
     assert not begin["open"]
     # one clip of the whole run is kept
     assert transport.command(CLIP, "more 1") is None
-    assert Clip(transport).value("/paths/tip/actual", "length", 0.5) == 50
+    assert Clip(transport).value("/paths/tip/actual", "length", start + 0.5) == 50
 
 
 def test_a_view_that_ends_does_not_end_the_run(
@@ -661,3 +672,76 @@ def test_the_frame_axes_are_those_of_the_tasks_frames(
     (row,) = (entry for entry in legend(recorder) if entry["key"] == "f")
     assert row["name"] == "Frame axes: panda_tcp"
     assert not row["shown"]
+
+
+def test_obstacles_of_runs_side_by_side_stand_beside_their_robots() -> None:
+    """The camera must see those of the second robot, too."""
+    experiment = load_experiment(PLANAR, "simulation.duration=0.1")
+    robot, run = experiment.robot, experiment.run()
+    both = Comparison(
+        RobotDrawing(robot), [ComparedRun(name, robot, run) for name in "ab"],
+        shown={}, beside=np.array([1.0, 0.0, 0.0]), dark=False,
+    )  # fmt: skip
+    shifts = []
+    for points in (both.points(), both.obstacle_points()):
+        first, second = np.split(points, 2)
+        shifts.append(second - first)
+        assert shifts[-1].min(axis=0)[0] > 1.0
+    np.testing.assert_allclose(
+        shifts[1], np.broadcast_to(shifts[0][0], shifts[1].shape)
+    )
+
+
+def test_a_half_space_that_turns_is_drawn_as_it_is_at_the_start() -> None:
+    wall, floor = [np.sqrt(0.5), 0.0, 0.0, np.sqrt(0.5)], [0.0, 0.0, 0.0, 1.0]
+    for turns, upward in (([wall, floor], 0.0), ([floor, wall], 1.0)):
+        columns = {"t": np.arange(2.0), "obstacle.board.quaternion": np.array(turns)}
+        motion = RunMotion(Robot.load("planar3r"), Rollout(columns, {}))
+        assert _upward("board", motion) == pytest.approx(upward, abs=1e-12)
+
+
+def test_a_growing_path_goes_on_from_its_last_point() -> None:
+    experiment = load_experiment(PLANAR, "simulation.duration=0.2")
+    run, robot = experiment.run(), experiment.robot
+    layer, extend = growing_paths(RunMotion(robot, run), "/paths")
+    list(layer.draw(1.0))
+    for first, last in ((0, 10), (10, 20)):  # each piece begins with a known row
+        rows = {name: each[first : last + 1] for name, each in run.columns.items()}
+        piece = RunMotion(robot, Rollout(rows, run.meta))
+        (track,) = layer.tracks(piece)
+        assert track.values.ravel().tolist() == [*range(first, last + 1)]
+        list(extend(piece))
+
+
+def test_the_pace_of_a_run_is_its_time_over_the_wall_time(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    now = [100.0]
+    clock = SimpleNamespace(perf_counter=lambda: now[-1], thread_time=thread_time)
+    monkeypatch.setattr(live, "time", clock)
+    experiment = load_experiment(PLANAR, "simulation.duration=0.5")
+    viewer, said = Viewer(experiment.robot, transport=Recorder()), list[str]()
+    monkeypatch.setattr(viewer, "replace_run", lambda *given: said.append(given[-1]))
+    view = LiveView(viewer, experiment)
+    run = experiment.run(on_row=view.on_row)
+    now.append(100.125)
+    view.finish(run)
+    assert said == ["computed at 4.0 × real time"]
+
+
+def test_the_pace_of_a_run_that_begins_late_counts_from_its_start(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    clock = iter(100.0 + 0.01 * np.arange(10_000))  # a hundredth of a second a row
+    now = SimpleNamespace(perf_counter=lambda: next(clock), thread_time=thread_time)
+    monkeypatch.setattr(live, "time", now)
+    for name in ("MIN_PERIOD", "MAX_PERIOD"):
+        monkeypatch.setattr(live, name, 0.0)
+    experiment = load_experiment(
+        PLANAR, "simulation.duration=0.2", "simulation.start_time=50"
+    )
+    transport = Watched()
+    view = LiveView(Viewer(experiment.robot, transport=transport), experiment)
+    experiment.run(on_row=view.on_row)
+    said = [c["text"] for c in transport.sent if c["type"] == "status"]
+    assert said[-1] == "computing at 1.0 × real time"

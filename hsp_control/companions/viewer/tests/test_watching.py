@@ -3,6 +3,7 @@
 import subprocess
 from asyncio import CancelledError
 from pathlib import Path
+from threading import Thread
 from typing import Any
 
 import numpy as np
@@ -228,3 +229,18 @@ def test_the_page_ends_with_the_loop(tmp_path: Path) -> None:
     assert isinstance(process, subprocess.Popen)
     page.close()
     assert process.returncode == 0
+
+
+def test_a_state_is_not_read_while_a_step_is_in_progress() -> None:
+    panda = hsp.Robot.load("panda")
+    controller = hsp.Controller(panda, [hsp.FramePose("panda_tcp")])
+    controller.compute(0.0, panda.home(), np.zeros(7))
+    follower = Follower(controller)
+    reading = Thread(target=follower.newest, daemon=True)
+    with controller._lock:
+        reading.start()
+        reading.join(0.1)
+        assert reading.is_alive()
+    reading.join(20.0)
+    assert not reading.is_alive()
+    follower.end()
