@@ -40,7 +40,7 @@ KEPT = 1e-3  # [m]
 
 _EDGE = "edge/threshold.py"
 _SHARES = "edge/shares.py"
-_TARGET = "edge/limited_target.py"
+_TARGET = "edge/limit_share.py"
 _HELD = "edge/held_levels.py"
 
 Edit = tuple[str, str, str]

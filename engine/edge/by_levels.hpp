@@ -1,4 +1,5 @@
-// The contribution of the first levels to the law, while a limit is active.
+// The contribution of the first levels to the law, while a limit is active, and what their errors
+// alone command: J# f of the exact law, f = Kp s(e). In an equilibrium only that is left of it.
 #pragma once
 #include "resolve.hpp"
 
@@ -7,9 +8,9 @@ namespace hsp {
 struct ByLevels {
   static constexpr const char* doc =
       "Write the part of a_damped due to the first k levels, for each level k but the last, and "
-      "the tasks' part of a, after `SelfMotions`.";
+      "the tasks' part of a, after `SelfMotions`; and J# f of the first k levels.";
   In<'m', 'n'> J, J_dot;
-  In<'m'> a_x;
+  In<'m'> a_x, demand;  // demand: f
   In<'n', 'n'> L;
   int form;
   In<'n'> v;
@@ -17,7 +18,7 @@ struct ByLevels {
   Ints<'l'> ends;             // where each level's rows end
   Ints<1> edge_level;
   In<'n'> a, self_motion;  // φ_N of it
-  Out<'l', 'n'> by_levels;
+  Out<'l', 'n'> by_levels, at_rest;
   Factors<Out> factors;  // Q = X J L⁻ᵀ, with orthonormal rows, and X lower triangular
   Scratch<'m', 'n'> B;
   Scratch<'m'> missing, part;
@@ -29,10 +30,11 @@ struct ByLevels {
     if (last < 0) return;
     whiten(J, L, form, B);
     orthonormalise_rows(B, factors.Q, factors.X);
+    write_exact(demand, last + 1, at_rest);
     if (last > 0) {
       missing = a_x;
       missing.noalias() -= J_dot * v;
-      edge_level[0] == 0 ? write_exact(last) : write_damped(last);
+      edge_level[0] == 0 ? write_exact(missing, last, by_levels) : write_damped(last);
     }
     by_levels.row(last) = (a - self_motion).transpose();
   }
@@ -40,15 +42,16 @@ struct ByLevels {
  private:
   // X is lower triangular: the first k levels of the exact law are those of a law without the
   // others.
-  void write_exact(Index last) {
-    part.noalias() = factors.X * missing;
+  template <class Demanded, class Rows>
+  void write_exact(const Demanded& demanded, Index levels, Rows& out) {
+    part.noalias() = factors.X * demanded;
     sum.setZero();
-    for (Index k = 0, start = 0; k < last; start = ends[k++]) {
+    for (Index k = 0, start = 0; k < levels; start = ends[k++]) {
       const Index rows = ends[k] - start;
       sum.noalias() += factors.Q.middleRows(start, rows).transpose() * part.segment(start, rows);
       level = sum;
       if (form != IDENTITY) solve_lower_transposed(L, level);
-      by_levels.row(k) = level.transpose();
+      out.row(k) = level.transpose();
     }
   }
 

@@ -53,15 +53,16 @@ int write_damped_levels(const LawInput& in, const Demand& rows, double least,
         thresholds.own[level], threshold_below(opposed, held, above, level, following, thresholds));
 
     // Its contribution in the null space of the levels above
-    const double smallest = open_level(J_k, projectors.Q, QJ, G, V, x);
-    write_bounded_inverse(V, x, threshold, G_inverse);
+    const auto units = thresholds.units.segment(start, size);
+    const double smallest = open_level(J_k, projectors.Q, units, QJ, G, V, x);
+    write_bounded_inverse(V, x, threshold, units, G_inverse);
     add_level(QJ, G_inverse, rest, row, a);
     add_level(QJ, G_inverse, opposed, row, drawn);
 
     // The projector for the levels below, and how much it turns or is unmet; contacts do neither
     thresholds.own[level] = threshold;
     if (springs.any() || (rows.yields.segment(start, size).array() > 0.0).any())
-      above = std::min(above, std::max(std::sqrt(smallest), threshold) / thresholds.scales[level]);
+      above = std::min(above, std::max(std::sqrt(smallest), threshold));
     if (smallest < threshold * threshold) {
       opposed = demand;
       opposed.noalias() -= J_k * drawn;

@@ -13,13 +13,16 @@
 //
 //   ρ = max_c (A/K - n²),      A = x max_j ‖L⁻¹e_j‖
 //
-// with A the largest joint acceleration due to x. Of a direction of the singular value s below its
-// threshold ε a level has the share 1 - (1 - s²/ε²)², as of the law.
+// with A the largest joint acceleration due to x. What persists is the command of the errors at
+// rest, J# f: without slack x is at most what is beyond the limit of that. A limit that brakes a
+// self-motion costs a task that is met nothing. Of a direction of the singular value s below its
+// threshold ε a level has the share 1 - λ (1 - s²/ε²)², with λ the slack of `limit_share.hpp`.
 #pragma once
 #include <hsp/linalg.hpp>
 #include <hsp/records.hpp>
 
 #include "../law/law.hpp"
+#include "excess.hpp"
 
 namespace hsp {
 
@@ -33,20 +36,19 @@ struct HeldLevels {
   In<'n'> effort;          // M a + N, plus the compensators' part
   In<'n'> law;             // its part by the law
   In<'l', 'n'> by_levels;  // the part of the law due to the first k levels
+  In<'l', 'n'> at_rest;    // J# f of them
   Factors<In> factors;     // Q = X J L⁻ᵀ, orthonormal rows, X lower triangular
   Ints<'l'> ends;          // where each level's rows end
   In<'l'> thresholds;      // ε of each level
-  struct {
-    In<'n'> lower, upper;
-  } bounds;           // on a
+  In<'m'> units;           // D, in which singular values are, see `Thresholds`
+  In<1> slack;             // λ
+  BoundsOfMotion bounds;
   In<'n'> permitted;  // efforts; inf where there is no limit
-  struct {
-    In<'k', 'w'> A;  // the first n columns are used
-    In<'k'> lower;   // for a deviation δ from a: A δ ≥ lower
-  } barred;
+  Barred<In> barred;
   double stiffest;  // K: maximum change of δ with its direction [1/s²]
   Out<'l'> held;
   Scratch<'n'> change, effort_change, row;
+  Scratch<'n'> rest, effort_at_rest;
   Scratch<'m'> share;
 
   void check() const {
@@ -60,6 +62,9 @@ struct HeldLevels {
     for (Index k = 0; k < held.size(); ++k) {
       change = by_levels.row(k).transpose() - law;
       effort_change.noalias() = M * change;
+      rest = at_rest.row(k).transpose();
+      effort_at_rest = effort;
+      effort_at_rest.noalias() += M * (rest - a);
       held[k] = cost(ends[k], longest / stiffest);
     }
   }
@@ -70,16 +75,18 @@ struct HeldLevels {
     for (Index k = 0, r = 0; k < ends.size(); ++k)
       for (; r < ends[k]; ++r) {
         const double inverse = factors.X(r, r);  // of the row, orthogonal to those before
-        const double s = inverse > 0.0 ? 1.0 / (inverse * thresholds[k]) : 0.0;
+        const double s = inverse > 0.0 ? 1.0 / (inverse * units[r] * thresholds[k]) : 0.0;
         const double left = std::max(1.0 - s * s, 0.0);
-        share[r] = 1.0 - left * left;
+        share[r] = 1.0 - slack[0] * left * left;
       }
   }
 
   // The largest of A/K - n² of all limits, 0 if there is none; `rows` belong to the levels.
   double cost(Index rows, double scale) {
     double most = 0.0;
-    const auto consider = [&](double excess) {  // of the limit in `row`
+    // The limit in `row`, with the excess at rest.
+    const auto consider = [&](double excess, double persists) {
+      excess -= (1.0 - slack[0]) * std::max(excess - std::max(persists, 0.0), 0.0);
       const double length = row.norm();
       double owned = 0.0;
       for (Index r = 0; r < rows; ++r) {
@@ -94,14 +101,14 @@ struct HeldLevels {
       const double below = bounds.lower[i] - std::max(x, x + dx);
       if (above > 0.0 || below > 0.0) {
         length_of_joint(i);
-        consider(std::max(above, below));
+        consider(std::max(above, below), above > 0.0 ? rest[i] : -rest[i]);
       }
       const double force = effort[i], df = effort_change[i];
       const double push = std::min(force, force + df) - permitted[i];
       const double pull = -permitted[i] - std::max(force, force + df);
       if (push > 0.0 || pull > 0.0) {
         whiten_row(M.col(i));
-        consider(std::max(push, pull));
+        consider(std::max(push, pull), std::abs(effort_at_rest[i]) - permitted[i]);
       }
     }
     for (Index r = 0; r < barred.lower.size(); ++r) {
@@ -109,7 +116,7 @@ struct HeldLevels {
       const double missing = barred.lower[r] - std::max(own.dot(change), 0.0);
       if (missing > 0.0) {
         whiten_row(own);
-        consider(missing);
+        consider(missing, -own.dot(rest));
       }
     }
     return most;

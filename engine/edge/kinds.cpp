@@ -1,6 +1,7 @@
 #include "../src/rooms.hpp"
 #include "by_levels.hpp"
 #include "held_levels.hpp"
+#include "limit_share.hpp"
 #include "limited_target.hpp"
 #include "parts.hpp"
 #include "resolve.hpp"
@@ -8,7 +9,7 @@
 
 namespace hsp {
 const Kind* const* edge_kinds() {
-  return kinds<Resolve, SelfMotions, ByLevels, HeldLevels, LimitedTarget, WriteThresholds,
+  return kinds<Resolve, SelfMotions, ByLevels, HeldLevels, LimitShare, LimitedTarget, WriteThresholds,
                ThresholdBelow, HowHeld>();
 }
 }  // namespace hsp

@@ -6,22 +6,24 @@ namespace hsp {
 
 struct WriteThresholds {
   static constexpr const char* doc =
-      "Write the threshold of each level; return a singular value of the stack from which on none "
-      "is bounded.";
-  In<'m', 'n'> J, B;  // B = J L⁻ᵀ
+      "Write the units of the rows and the threshold of each level; return a singular value of the "
+      "stack from which on none is bounded.";
+  In<'m', 'n'> J;
+  InOut<'m', 'n'> B;  // J L⁻ᵀ, overwritten by D⁻¹ J L⁻ᵀ
   Demand rows;
   double least, turning;
   Following following;
   Thresholds thresholds;
 
   double operator()() {
-    return write_thresholds(J, B, rows, least, turning, following, thresholds);
+    write_units(J, B, rows, following, thresholds);
+    return write_thresholds(rows, least, turning, following, thresholds);
   }
 };
 
 struct ThresholdBelow {
   static constexpr const char* doc = "The least ε of a level below others.";
-  In<'m'> demand;
+  In<'d'> demand;  // its own
   double held, above;
   int level;
   Following following;

@@ -74,8 +74,10 @@ struct Resolve {
     edge.share[0] = 0.0;
     auto& [Q, X] = factors;
     const auto& J = law.task.jacobian;
-    if (J.rows() > J.cols() || !exact_inverse(memory.B, threshold, Q, X, memory.square))
-      return false;
+    if (J.rows() > J.cols()) return false;
+    const bool exact = exact_inverse(memory.B, threshold, Q, X, memory.square);
+    X *= thresholds.units.cwiseInverse().asDiagonal();
+    if (!exact) return false;
     write_law(law, inverse(Q, X), memory.law, e_N, a);
     return alone || is_finite();
   }
@@ -121,6 +123,7 @@ struct Resolve {
   int damped_at_once(double threshold) {
     auto& [Q, X] = factors;
     damped_inverse(memory.B, threshold, Q, X);
+    X *= thresholds.units.cwiseInverse().asDiagonal();
     write_law(law, inverse(Q, X), memory.law, e_N, a);
     return 1;
   }
@@ -131,12 +134,14 @@ struct Resolve {
                                memory.levels, edge.by_tasks, e_N, a);
   }
 
-  // Write B = J L⁻ᵀ and the thresholds; return a singular value from which on no level is bounded.
+  // Write B = D⁻¹ J L⁻ᵀ and the thresholds; return a singular value of B from which on no level is
+  // bounded. Of the inverses of B the factor X becomes that of J L⁻ᵀ by X D⁻¹.
   double write_whitened() {
     const auto& J = law.task.jacobian;
     whiten(J, law.metric.L, law.form, memory.B);
     const double turning = turning_threshold(law.field.g, following);
-    return write_thresholds(J, memory.B, rows, least, turning, following, thresholds);
+    write_units(J, memory.B, rows, following, thresholds);
+    return write_thresholds(rows, least, turning, following, thresholds);
   }
 };
 

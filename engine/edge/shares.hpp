@@ -6,15 +6,16 @@
 // the exact inverse of that changes faster than a sampled loop can follow, so the inverse of
 // a_damped is bounded by thresholds that follow the command (`threshold.hpp`). But a
 // threshold cannot distinguish an error that persists from a step within reach. Three conditions
-// can: a singularity, a large error, or an active limit. So μ is the largest of three shares, each
-// of them 0 in the interior of the workspace:
+// can: a singularity, a large error, or an active limit. So μ has three shares, each of them 0 in
+// the interior of the workspace:
 //
 //   near    σ ≥ σ_x: 0;  σ ≤ σ_x/2: 1.    σ_x is a tenth of the robot's size
 //   far     |e| ≤ 0.85 ℓ: 0;  |e| ≥ ℓ: 1.      ℓ is the largest error that is fed back
-//   limits  a_t is within all limits: 0;  it is three times the permitted one: 1
+//   limits  a_t is within all limits: 0;  it is three times the permitted one: 1;
+//           at most r_f, what errors at rest command of the permitted one
 //
 // with σ the smallest singular value of the stack J, whatever the metric. The first two are here,
-// the last is in `limited_target.hpp`, where limits are known. All are continuous, so a is.
+// the last is in `limit_share.hpp`, where limits are known. All are continuous, so a is.
 #pragma once
 #include <hsp/linalg.hpp>
 

@@ -8,7 +8,12 @@
 //   ε² = max(ε_0², ‖f‖/L)
 //
 // the acceleration due to f changes by at most 2 L per unit of s, for any target.
-// docs/edge.md has the propositions, and the origin of each constant.
+//
+// That is of the identity as metric. In another one the rows of J L⁻ᵀ have another length than
+// those of J: an orientation's may be twenty times as long, since wrists are light, and a position's
+// half as long. So s is a singular value of D⁻¹ J L⁻ᵀ, and χ is that of D⁻¹ G D⁻¹, with D the ratio
+// of both lengths for the rows of a part of an error, a position or an orientation. An exact inverse
+// does not depend on D. docs/edge.md has the propositions, and the origin of each constant.
 #pragma once
 #include <hsp/indices.hpp>
 #include <hsp/records.hpp>
@@ -32,19 +37,23 @@ struct Following {
 struct Thresholds {
   InOut<'l'> own;      // ε of each level
   InOut<'l'> follows;  // the part of it that follows f
-  InOut<'l'> scales;   // ratio of J L⁻ᵀ to J, at least 1: the unit of ε
+  InOut<'m'> units;    // D, of each row
 };
 
 // Commands of the rows of the stack, level after level.
 struct Demand {
   Ints<'l'> ends;      // where each level's rows end
+  Ints<'p'> parts;     // where the rows of each part of an error end
   In<'m'> demand;      // f, the feedback's command at rest
   In<'m'> yields;      // factor of L for a row; 0: it is not active
   In<'m'> pulls;       // force of a spring relative to its largest
   Flags<'m'> springs;  // whether a row is that of a spring
   In<'m'> stretched;   // length of an error relative to its largest
 
-  void check() const { check_ends("ends", ends, demand.size()); }
+  void check() const {
+    check_ends("ends", ends, demand.size());
+    check_ends("parts", parts, demand.size());
+  }
 };
 
 // The ε that a field needs while a spring is saturated.
@@ -52,12 +61,35 @@ template <class G> double turning_threshold(const G& g, const Following& followi
   return following.turning * std::min(g.norm(), following.quickest);
 }
 
-// Write the threshold of each level, B = J L⁻ᵀ; return a singular value of the stack from which on
-// no level is bounded.
+// Overwrite B = J L⁻ᵀ by D⁻¹ B, and write D. Thresholds that follow nothing are in the metric's
+// units: D = 1.
 template <class J, class B>
-double write_thresholds(const J& jacobian, const B& whitened, const Demand& rows, double least,
-                        double turning, const Following& following, Thresholds& thresholds) {
-  double largest = least, above = 0.0;  // the largest scale of the levels above
+void write_units(const J& jacobian, B& whitened, const Demand& rows, const Following& following,
+                 Thresholds& thresholds) {
+  auto& units = thresholds.units;
+  units.setOnes();
+  if (!(following.size > 0.0)) return;
+  Index start = 0;
+  for (Index part = 0; part < rows.parts.size(); ++part) {
+    const Index size = rows.parts[part] - start;
+    const double plain = jacobian.middleRows(start, size).squaredNorm();
+    const double longer = whitened.middleRows(start, size).squaredNorm();
+    if (longer > plain && plain > 0.0) {
+      const double unit = std::sqrt(longer / plain);
+      units.segment(start, size).setConstant(unit);
+      whitened.middleRows(start, size) /= unit;
+    }
+    start = rows.parts[part];
+  }
+}
+
+// Write the threshold of each level; return a singular value of the stack D⁻¹ J L⁻ᵀ from which on
+// no level is bounded. The law is exact from ε_0 on in the metric's own units, whatever D is.
+inline double write_thresholds(const Demand& rows, double least, double turning,
+                               const Following& following, Thresholds& thresholds) {
+  least /= std::max(1.0, greatest(thresholds.units));
+  double largest = least;
+  bool below = false;  // others
   Index start = 0;
   for (Index level = 0; level < rows.ends.size(); ++level) {
     const Index size = rows.ends[level] - start;
@@ -68,36 +100,29 @@ double write_thresholds(const J& jacobian, const B& whitened, const Demand& rows
     const double square = (yields > 0.0).select(demand.square(), 0.0).sum();
     const double more = (yields > 0.0).select((yields - 1.0) * demand.square(), 0.0).sum();
     const double pull = rows.pulls.segment(start, size).norm();
-    const double plain = jacobian.middleRows(start, size).squaredNorm();
-    const double longer = whitened.middleRows(start, size).squaredNorm();
-    const double scale = plain > 0.0 ? std::sqrt(std::max(longer / plain, 1.0)) : 1.0;
-
     double beyond = std::max(std::sqrt(square) - following.modest, 0.0);
     if (beyond > 0.0) beyond *= 1.0 + more / square;
-    const double follows = scale * std::sqrt(beyond / following.steepest);
-    const double own = std::max({least, follows, scale * std::min(pull, 1.0) * turning});
+    const double follows = std::sqrt(beyond / following.steepest);
+    const double own = std::max({least, follows, std::min(pull, 1.0) * turning});
     largest = std::max(largest, own);
     // No s is below that of the stack: `threshold_below` is not above it then.
-    if (above > 0.0)
-      largest = std::max(largest, std::cbrt(follows * follows * following.size * above));
+    if (below) largest = std::max(largest, std::cbrt(follows * follows * following.size));
     thresholds.own[level] = own;
     thresholds.follows[level] = follows;
-    thresholds.scales[level] = scale;
-    if (sprung || tracks) above = std::max(above, scale);
+    below |= sprung || tracks;
     start = rows.ends[level];
   }
   return largest;
 }
 
 // The least ε of a level below others. It commands f - J a_f; `held` is how far the levels above
-// are unmet, and `above` their smallest singular value in their scale, inf if none is near a
-// singularity.
+// are unmet, and `above` their smallest singular value, inf if none is near a singularity.
 template <class F>
 double threshold_below(const F& demand, double held, double above, Index level,
                        const Following& following, const Thresholds& thresholds) {
   const double beyond = std::max(demand.norm() - following.modest, 0.0);
-  const double scale = thresholds.scales[level], follows = thresholds.follows[level];
-  const double square = scale * scale * held * following.below * beyond / following.steepest;
+  const double follows = thresholds.follows[level];
+  const double square = held * following.below * beyond / following.steepest;
   return std::sqrt(square + follows * follows * following.size / above);
 }
 

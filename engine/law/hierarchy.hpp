@@ -40,29 +40,33 @@ template <class L, class Q> void invert_metric(const L& factor, Q& inverse) {
   }
 }
 
-// Write Q Jᵀ and J Q Jᵀ = Σ x_r V_r V_rᵀ, V_r the rows of V; return the smallest x. G is used.
-template <class J, class Q, class QJ, class G, class V, class X>
-double open_level(const J& jacobian, const Q& projector, QJ&& product, G&& gram, V&& turned,
-                  X&& x) {
+// Write Q Jᵀ and D⁻¹ G D⁻¹ = Σ x_r V_r V_rᵀ, with G = J Q Jᵀ, D the diagonal of the rows' units, and
+// V_r the rows of V; return the smallest x. G is used.
+template <class J, class Q, class D, class QJ, class G, class V, class X>
+double open_level(const J& jacobian, const Q& projector, const D& units, QJ&& product, G&& gram,
+                  V&& turned, X&& x) {
   product.noalias() = projector.lazyProduct(jacobian.transpose());
   gram.noalias() = jacobian.lazyProduct(product);
   for (Index p = 0; p < gram.rows(); ++p)
-    for (Index k = 0; k < p; ++k) gram(k, p) = gram(p, k);
+    for (Index k = 0; k <= p; ++k) gram(k, p) = gram(p, k) /= units[p] * units[k];
   // G is symmetric and not negative: its rows' lengths become its eigenvalues.
   orthogonalise_rows(gram, turned);
   x = gram.rowwise().norm();
   return x.size() ? x.minCoeff() : std::numeric_limits<double>::infinity();
 }
 
-// χ(G) of G = Σ x_r V_r V_rᵀ: 1/x where x is above threshold², and bounded below.
-template <class V, class X, class Out>
-void write_bounded_inverse(const V& turned, const X& x, double threshold, Out&& inverse) {
+// D⁻¹ χ(D⁻¹ G D⁻¹) D⁻¹: G⁻¹ where all x are above threshold², and bounded below.
+template <class V, class X, class D, class Out>
+void write_bounded_inverse(const V& turned, const X& x, double threshold, const D& units,
+                           Out&& inverse) {
   const double floor = threshold * threshold;
   inverse.setZero();
   for (Index r = 0; r < x.size(); ++r) {
     const double q = x[r] >= floor ? 1.0 / x[r] : (2.0 - x[r] / floor) / floor;
     inverse.noalias() += q * turned.row(r).transpose().lazyProduct(turned.row(r));
   }
+  for (Index p = 0; p < inverse.rows(); ++p)
+    for (Index k = 0; k < inverse.cols(); ++k) inverse(p, k) /= units[p] * units[k];
 }
 
 // Add Q Jᵀ χ(G) times the level's residual to a.

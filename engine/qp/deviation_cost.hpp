@@ -24,6 +24,9 @@
 // Away from singularities each share is a projector, and each n_k belongs to one level. Near one
 // the law releases a part of a direction to the levels below, and so does H: it is a continuous
 // function of the law's projectors.
+//
+// A limit that a self-motion meets costs a task that is met nothing: both, that release and the
+// cost that grows with the error, are scaled by the slack λ of `edge/limit_share.hpp`.
 #pragma once
 #include <algorithm>
 #include <cmath>
@@ -59,8 +62,11 @@ struct Directions {
   double least;           // least cost of a level relative to the one above it
   In<'l'> held;           // minimum costs below each level, see `HeldLevels`
   In<'l'> thresholds;     // singular value below which a direction belongs to a level in part
+  In<'m'> units;          // D, in which singular values are
   Factors<In> factors;
   Projectors<In> projectors;
+  Factors<In> exact;   // of the exact inverse, where μ < 1
+  In<1> slack;         // λ
   Ints<1> edge_level;  // the first level whose inverse the damped law bounds; 0: none
   bool alone;          // whether the law resolves its one level at once, whatever happens
   Out<'n', 'n'> N;     // directions n_k as rows
@@ -81,11 +87,9 @@ struct Directions {
     write_costs();
     const Index levels = ends.size(), damped = edge_level[0];
     if (damped == 0) {
-      // Q = X B with orthonormal rows and a lower triangular X, level after level.
-      const Index count = std::min(jacobian.rows(), N.rows());  // more of them are never exact
-      N.topRows(count) = factors.Q.topRows(count);
-      write_roots(count);
-      complete(count);
+      write_exact_levels(factors.Q);
+    } else if (slack[0] == 0.0) {
+      write_exact_levels(exact.Q);
     } else if (alone) {
       complete(write_damped_level());
     } else {
@@ -120,7 +124,7 @@ struct Directions {
       const double of_error = k < last - 1 ? below_level : below_last;
       const double length = error.segment(start, rows).norm();
       // A standing robot keeps its balance at any cost.
-      const double far = std::min(of_error * length / size, most);
+      const double far = slack[0] * std::min(of_error * length / size, most);
       const double below = standing ? 0.0 : std::max(far, held[k]);
       if (k >= first && (standing || !is_spring))
         log_cost += std::log(std::clamp(below, least, 1.0));
@@ -133,10 +137,19 @@ struct Directions {
     if (log_cost < 0.0) costs.t /= log_cost;
   }
 
+  // Of Q = X B, with orthonormal rows and a lower triangular X, level after level.
+  template <class Rows> void write_exact_levels(const Rows& Q) {
+    const Index count = std::min(jacobian.rows(), N.rows());  // more of them are never exact
+    N.topRows(count) = Q.topRows(count);
+    write_roots(count);
+    complete(count);
+  }
+
   // Write the directions that belong to one of the first levels alone; return their number. The
   // last of them may have singular values below the threshold: these are left out.
   Index write_levels(Index levels) {
     whiten(jacobian, L, form, B);
+    B = units.cwiseInverse().asDiagonal() * B;
     Index count = 0, start = 0;
     for (Index k = 0; k < levels; ++k) {
       auto rows = B.middleRows(start, ends[k] - start);
@@ -174,18 +187,20 @@ struct Directions {
 
   // Write the directions of the only level, if the law has found its spectrum; return their number.
   //
-  // First those that belong to it alone. The null space has the share (1 - s²/threshold²)² of a
+  // First those that belong to it alone. The null space has the share λ (1 - s²/threshold²)² of a
   // direction with the singular value s below the threshold.
   Index write_damped_level() {
     const auto& Q = factors.Q;
     const double threshold = thresholds[0], own = costs.root[0];
+    // With a part of the exact law no singular value is small (`edge/shares.hpp`).
+    const double least_value = slack[0] < 1.0 ? 0.0 : lost * threshold;
     Index count = 0;
     const auto add = [&](bool partly) {
       for (Index r = 0; r < Q.rows(); ++r) {
         const double s = Q.row(r).norm();
-        if ((s < threshold) != partly || s <= lost * threshold || count == N.rows()) continue;
+        if ((s < threshold) != partly || s <= least_value || count == N.rows()) continue;
         const double left = std::max(1.0 - (s / threshold) * (s / threshold), 0.0);
-        root[count] = own * std::pow(free_root() / own, left * left);
+        root[count] = own * std::pow(free_root() / own, slack[0] * left * left);
         N.row(count++) = Q.row(r) / s;
       }
     };
@@ -198,7 +213,8 @@ struct Directions {
   // Overwrite the directions after the first ones, which are shared by levels.
   //
   // These are the eigenvectors of T = Σ t_k (P_{k-1} - P_k) + P_K in the rows of N from `count` on,
-  // and their costs ρ_N^t for the eigenvalues t.
+  // and their costs ρ_N^t for the eigenvalues t. T is that of the damped law, in the proportion λ,
+  // and that of the exact one.
   void share_rest(Index count) {
     const Index d = N.rows() - count;
     if (d == 0) return;
@@ -221,12 +237,28 @@ struct Directions {
       }
       start = ends[k];
     }
+    if (slack[0] < 1.0) mix_with_exact(rest, T_d);
     T_d.diagonal().array() += 1.0;  // eigenvalues between 1 and 2: their vectors are well defined
     orthogonalise_rows(T_d, U_d);
     for (Index r = 0; r < d; ++r)
       root[count + r] = std::pow(free_root(), std::clamp(T_d.row(r).norm() - 1.0, 0.0, 1.0));
     F_d.noalias() = U_d * rest;
     rest = F_d;
+  }
+
+  // λ T + (1 - λ) T_exact; of that law each row q of Q belongs to one level, and what is left of
+  // the identity to the null space.
+  template <class Rest, class Square> void mix_with_exact(const Rest& rest, Square& T_d) {
+    const double other = 1.0 - slack[0];
+    T_d *= slack[0];
+    T_d.diagonal().array() += other;
+    auto q = FG.col(0).head(rest.rows());
+    Index k = 0;
+    for (Index r = 0; r < exact.Q.rows(); ++r) {
+      while (r >= ends[k]) ++k;
+      q.noalias() = rest * exact.Q.row(r).transpose();
+      T_d.noalias() += other * (costs.t[k] - 1.0) * q * q.transpose();
+    }
   }
 
   // Complete the first directions to an orthonormal basis, with the null space.

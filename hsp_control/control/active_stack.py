@@ -3,6 +3,7 @@
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from functools import cached_property, partial
+from itertools import chain
 from typing import Any, NamedTuple, NoReturn
 
 import numpy as np
@@ -83,6 +84,7 @@ class ActiveStack:
         )
         first = [held + free] if held + free else []
         sizes = [sum(task.rows for task in level) for level in self.levels]
+        of_tasks = chain(*(task.error_parts for task in chain(*self.levels)))
         self.law = BoundLaw(
             first + sizes,
             robot.nv,
@@ -90,6 +92,11 @@ class ActiveStack:
             gain,
             threshold,
             Following.of(robot.size, on_legs=bool(robot.unactuated)),
+            parts=[
+                *(contact.rows for contact in self.contacts),
+                *([free] if free else []),
+                *(part.size for part in of_tasks),
+            ],
             controls=field.controls,
         )
         self.rows = self.law.problem.task  # all rows stacked: J, J', e, e', a_x

@@ -10,7 +10,7 @@ import numpy as np
 
 from hsp_control import engine
 from hsp_control.common.arrays import Array, Indices
-from hsp_control.edge.step import EdgeMemory, Factors, Projectors
+from hsp_control.edge.step import ByLevels, EdgeMemory, Factors, Projectors
 from hsp_control.edge.threshold import NOT, Following, Thresholds
 from hsp_control.engine.plans import OnlyIf, PartCall
 from hsp_control.law.outcome import LawOutcome
@@ -28,6 +28,7 @@ class BoundLaw:
         form: The metric's form.
         threshold: ε_0, the singular value below which the inverse is always bounded.
         thresholds: ε of each level, of the last `call`, shape (levels,).
+        units: Of the singular values, for each row, shape (m,); see `Thresholds`.
         acceleration: a of the last `call`, shape (nv,).
         null_space_error: e_N of the last `call`, shape (nv,).
         outcome: The outcome of the law then.
@@ -49,17 +50,30 @@ class BoundLaw:
         threshold: float,
         following: Following = NOT,
         *,
+        parts: Sequence[int] | None = None,
         controls: bool = True,
     ) -> None:
-        """Allocate; ``controls``: whether there is a field; without one u = 0."""
+        """Allocate.
+
+        Args:
+            levels: Number of rows of each level, m in all.
+            nv: Degrees of freedom.
+            form: The metric's form.
+            gain: K_N, shape (nv, nv) [1/s].
+            threshold: ε_0.
+            following: What thresholds follow.
+            parts: Number of rows of each part of an error, such as a position; None:
+                each level is one part.
+            controls: Whether there is a field; without one u = 0.
+        """
         m = sum(levels)
-        self.problem = Problem(m, nv, gain)
+        self.problem = Problem(m, nv, gain, np.cumsum([*(parts or levels)] or [0]))
         self.ends: Indices = np.cumsum([*levels] or [0], dtype=np.int64)
         self.form = form
         self.threshold, self._following = threshold, following
         self._controls = controls
-        self._thresholds = Thresholds.allocate(len(self.ends))
-        self.thresholds = self._thresholds.own
+        self._thresholds = Thresholds.allocate(len(self.ends), m)
+        self.thresholds, self.units = self._thresholds.own, self._thresholds.units
         self.thresholds[:] = threshold
         self.factors = Factors(np.zeros((m, nv)), np.zeros((m, m)))
         self.projectors = Projectors.allocate(m, nv)
@@ -151,25 +165,25 @@ class BoundLaw:
         )
         return call, written
 
-    def by_levels(self, v: Array) -> tuple[PartCall, tuple[Array, Factors]]:
+    def by_levels(self, v: Array) -> tuple[PartCall, ByLevels]:
         """Return the call that writes the levels' contributions, after `self_motions`.
 
         Args:
             v: Velocity, shape (nv,).
 
         Returns:
-            The call, and its results: the part of the first k levels in a_damped for
-            each level k but the last, and that of all tasks in a, shape (levels, nv);
-            orthonormal rows Q = X J L⁻ᵀ of the stack, X lower triangular.
+            The call, and its results.
         """
-        task, m = self.problem.task, len(self.problem.demand)
-        made = np.zeros((len(self.ends), len(v)))
+        task, demand = self.problem.task, self.problem.demand
+        shape, m = (len(self.ends), len(v)), len(demand)
         factors = Factors(np.zeros((m, len(v))), np.zeros((m, m)))
+        written = ByLevels(np.zeros(shape), np.zeros(shape), factors)
         call = PartCall(
             engine.ByLevels,
             J=task.jacobian,
             J_dot=task.jacobian_dot,
             a_x=task.acceleration,
+            demand=demand,
             L=self.problem.metric.L,
             form=self.form,
             v=v,
@@ -178,10 +192,9 @@ class BoundLaw:
             edge_level=self.edge_level,
             a=self.acceleration,
             self_motion=self._self_motions[0],
-            by_levels=made,
-            factors=factors,
+            **written._asdict(),
         )
-        return call, (made, factors)
+        return call, written
 
     def diagnosis(self, first: int) -> tuple[PartCall, Array, Array]:
         """Return a call that computes the law's distance from singularity and rest.

@@ -13,8 +13,8 @@ import numpy as np
 from hsp_control import engine
 from hsp_control.common.arrays import Array
 from hsp_control.edge.bound_law import BoundLaw
-from hsp_control.edge.limited_target import Barred, Within
-from hsp_control.edge.step import Factors
+from hsp_control.edge.limit_share import Barred, Within
+from hsp_control.edge.step import ByLevels
 from hsp_control.engine.plans import PartCall
 
 STIFFEST = 1000.0
@@ -28,8 +28,8 @@ def held_levels(
     a: Array,
     effort: Array,
     law: BoundLaw,
-    by_levels: Array,
-    factors: Factors,
+    parts: ByLevels,
+    slack: Array,
     bounds: Within,
     permitted: Array,
     barred: Barred,
@@ -41,8 +41,8 @@ def held_levels(
         a: The law's acceleration, and that of compensators, shape (nv,).
         effort: M a + N, and the compensators' effort, shape (nv,).
         law: The law.
-        by_levels: The part of the first k levels in it, shape (levels, nv).
-        factors: Orthonormal rows Q = X J L⁻ᵀ of all levels, X lower triangular.
+        parts: Contributions of the first levels to it.
+        slack: Of the priorities, shape (1,); see `limit_share`.
         bounds: Bounds on the acceleration.
         permitted: Maximum efforts, inf where there is no limit, shape (nv,).
         barred: Rows of barriers, for deviations from a.
@@ -51,7 +51,7 @@ def held_levels(
         The call, and its result, shape (levels,): ρ for the first levels' command
         beyond limits, 0 without one. It may be more than 1.
     """
-    held, metric = np.zeros(len(by_levels)), law.problem.metric
+    held, metric = np.zeros(len(law.ends)), law.problem.metric
     call = PartCall(
         engine.HeldLevels,
         M=M,
@@ -60,10 +60,11 @@ def held_levels(
         a=a,
         effort=effort,
         law=law.acceleration,
-        by_levels=by_levels,
-        factors=factors,
+        **parts._asdict(),
         ends=law.ends,
         thresholds=law.thresholds,
+        units=law.units,
+        slack=slack,
         bounds=bounds,
         permitted=permitted,
         barred=barred,

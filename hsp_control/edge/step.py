@@ -14,6 +14,14 @@ class Factors(NamedTuple):
     X: Array  # (m, m)
 
 
+class ByLevels(NamedTuple):
+    """The contributions of the first k levels to the law, for each level k."""
+
+    by_levels: Array  # part of a_damped, and for the last level of a, (levels, nv)
+    at_rest: Array  # J# Kp s(e), the command of their errors alone, (levels, nv)
+    factors: Factors  # orthonormal rows Q = X J L⁻ᵀ of the stack, X lower triangular
+
+
 class Projectors(NamedTuple):
     """The projectors of the damped law of several levels.
 

@@ -28,8 +28,10 @@ commands. They command f - J a_f, with a_f the acceleration of the higher levels
 rest, which a met task compensates. So a lower level uses a fortieth of L, in proportion
 to the unmet command of the level above.
 
-All but ε_0 are for the identity as metric. With a metric for which J L⁻ᵀ is longer than
-J, the same arm has the same slope at a larger ε.
+All but ε_0 are for the identity as metric. In another one the rows of J L⁻ᵀ have
+another length than those of J, and the singular values are in units of their ratio, for
+each position and each orientation on its own: with W = M(q) the rows of an orientation
+are long, since wrists are light.
 """
 
 from typing import NamedTuple, Self
@@ -87,13 +89,13 @@ NOT = Following.of(0.0, on_legs=False)  # no threshold follows commands
 
 
 class Thresholds(NamedTuple):
-    """The thresholds of the levels' inverses, each of shape (levels,)."""
+    """The thresholds of the levels' inverses."""
 
-    own: Array  # ε of each level
-    follows: Array  # the part of it that follows f
-    scales: Array  # ratio of J L⁻ᵀ to J, at least 1: the unit of ε
+    own: Array  # ε of each level, shape (levels,)
+    follows: Array  # the part of it that follows f, shape (levels,)
+    units: Array  # D, the unit of singular values for each row, shape (m,)
 
     @classmethod
-    def allocate(cls, levels: int) -> Self:
-        """Return the thresholds of a number of levels."""
-        return cls(*np.zeros((3, levels)))
+    def allocate(cls, levels: int, rows: int) -> Self:
+        """Return the thresholds of a number of levels with m ``rows``."""
+        return cls(np.zeros(levels), np.zeros(levels), np.ones(rows))

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hsp_control.common.arrays import Array, Flags
+from hsp_control.common.arrays import Array, Flags, Indices
 from hsp_control.law.samples import FieldSample, MetricSample, TaskSample
 
 
@@ -55,6 +55,7 @@ class Problem:
         field: g and g'.
         metric: W, its Cholesky factor and W'; the identity until it is written.
         gain: K_N, shape (nv, nv) [1/s].
+        parts: Ends of the rows of the parts of errors, such as a position's.
         demand: Kp s(e), the feedback's command at rest in the coordinates of e,
             shape (m,); zero in rows without one, such as those of contacts.
         yields: Weight with which the threshold of a row's level follows the row's
@@ -68,13 +69,13 @@ class Problem:
             all rows alike; while limits are active, a spring yields like a body.
     """
 
-    def __init__(self, rows: int, nv: int, gain: Array) -> None:
+    def __init__(self, rows: int, nv: int, gain: Array, parts: Indices) -> None:
         """Allocate for a number of rows and of degrees of freedom."""
         self.record = StepRecord.allocate(rows, nv)
         self.task = self.record.task
         self.field = self.record.field
         self.metric = MetricSample.allocate(nv)
-        self.gain = gain
+        self.gain, self.parts = gain, parts
         self.demand = np.zeros(rows)
         self.yields = np.zeros(rows)
         self.pulls = np.zeros(rows)
@@ -82,7 +83,7 @@ class Problem:
         self.springs = np.zeros(rows, dtype=np.bool_)
 
     @property
-    def rows(self) -> dict[str, Array | Flags]:
+    def rows(self) -> dict[str, Array | Flags | Indices]:
         """The quantities of the rows, by name."""
-        names = "demand", "yields", "pulls", "springs", "stretched"
+        names = "parts", "demand", "yields", "pulls", "springs", "stretched"
         return {name: getattr(self, name) for name in names}

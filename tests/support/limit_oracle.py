@@ -42,13 +42,15 @@ def stacked(*rows: Rows) -> Rows:
     return Rows(*(np.concatenate(parts) for parts in zip(*rows, strict=True)))
 
 
-def level_costs(law: BoundLaw, supported: bool, size: float, held: Array) -> Array:
+def level_costs(
+    law: BoundLaw, supported: bool, size: float, held: Array, slack: float
+) -> Array:
     """Return ρ of each level, then of the null space, shape (levels + 1,).
 
-    The cost of levels below one is proportional to that level's error over the robot's
-    size, at most a tenth and at least ``costs``; or ``held``, if larger, up to the cost
-    of the level itself. Below contacts it is ``costs`` for any error. Contacts cost as
-    much as the level below them; so do springs without contacts.
+    The cost of levels below one is the slack times that level's error over the robot's
+    size, that at most a tenth, and at least ``costs``; or ``held``, if larger, up to
+    the cost of the level itself. Below contacts it is ``costs`` for any error. Contacts
+    cost as much as the level below them; so do springs without contacts.
     """
     count = len(law.ends) - supported
     least = 1e-6 ** (1.0 / max(count, 1))
@@ -56,7 +58,7 @@ def level_costs(law: BoundLaw, supported: bool, size: float, held: Array) -> Arr
     for k, end in enumerate(law.ends):
         error = np.linalg.norm(law.problem.task.error[start:end])
         of_error = 0.2 if k == len(law.ends) - 1 else 1.0
-        below = max(min(of_error * error / size, 0.1), held[k])
+        below = max(slack * min(of_error * error / size, 0.1), held[k])
         below = np.clip(0.0 if supported else below, least, 1.0)
         springs = law.problem.springs[start:end].all() and not supported
         equal = springs or (supported and k == 0)
@@ -65,17 +67,34 @@ def level_costs(law: BoundLaw, supported: bool, size: float, held: Array) -> Arr
     return np.array(costs)
 
 
-def deviation_cost(law: BoundLaw, supported: bool, size: float, held: Array) -> Array:
+def deviation_cost(
+    law: BoundLaw, supported: bool, size: float, held: Array, slack: float
+) -> Array:
     """Return H, shape (nv, nv), also where levels share directions.
 
-    log H = Σ log ρ_k (P_{k-1} - P_k), with P_k from the spectra of the levels.
+    log H = Σ log ρ_k (P_{k-1} - P_k), with P_k from the spectra of the levels: by the
+    damped law in proportion to the slack, the rest by the exact one.
     """
+    L = law.problem.metric.L
+    logs = np.log(level_costs(law, supported, size, held, slack))
+    log_H = np.zeros_like(L)
+    for share, thresholds in (
+        (slack, law.thresholds),
+        (1.0 - slack, 0.0 * law.thresholds),
+    ):
+        if share > 0.0:
+            log_H += share * _log_cost(law, logs, thresholds)
+    steps, V = np.linalg.eigh(log_H)
+    return np.asarray(L @ (V * np.exp(steps)) @ V.T @ L.T)
+
+
+def _log_cost(law: BoundLaw, logs: Array, thresholds: Array) -> Array:
+    """Return log H in whitened coordinates, of a law with given thresholds."""
     J, L = law.problem.task.jacobian, law.problem.metric.L
-    whitened, n = np.linalg.solve(L, J.T).T, len(L)
-    logs = np.log(level_costs(law, supported, size, held))
+    whitened, n = np.linalg.solve(L, J.T).T / law.units[:, None], len(L)
     P, T, start = np.eye(n), np.zeros((n, n)), 0
     for k, end in enumerate(law.ends):
-        B, floor = whitened[start:end], law.thresholds[k] ** 2
+        B, floor = whitened[start:end], max(thresholds[k], 1e-9) ** 2
         sizes, U = np.linalg.eigh(B @ P @ B.T)
         above = np.maximum(sizes, floor)
         inverse = np.where(sizes < floor, (2.0 - sizes / floor) / floor, 1.0 / above)
@@ -83,8 +102,7 @@ def deviation_cost(law: BoundLaw, supported: bool, size: float, held: Array) -> 
         T += logs[k] * own
         P = P - own
         start = end
-    steps, V = np.linalg.eigh(T + logs[-1] * P)
-    return np.asarray(L @ (V * np.exp(steps)) @ V.T @ L.T)
+    return np.asarray(T + logs[-1] * P)
 
 
 class Step(NamedTuple):
@@ -107,6 +125,7 @@ def limited_step(
     weight: float,
     size: float,
     costs: Array,
+    slack: float,
 ) -> Step:
     """Return the QP of efforts within bounds, motion within bounds, and cones.
 
@@ -122,10 +141,11 @@ def limited_step(
         weight: The robot's weight [N].
         size: The robot's size [m].
         costs: Smallest costs below each level, shape (levels,).
+        slack: Of the priorities.
     """
     n, p = len(a), support.size
     H = np.zeros((n + p, n + p))
-    H[:n, :n] = deviation_cost(law, p > 0, size, costs)
+    H[:n, :n] = deviation_cost(law, p > 0, size, costs, slack)
     cost = _FORCE_COST / np.maximum(support.inverse_cost, 1e-6)
     H[range(n, n + p), range(n, n + p)] = cost
     f = np.zeros(n + p)

@@ -41,7 +41,7 @@ from hsp_control.control.actuation.limited_step import (
 from hsp_control.control.actuation.limits_in_force import LimitSet
 from hsp_control.control.actuation.support import Support
 from hsp_control.edge import BoundLaw
-from hsp_control.edge.limited_target import Permitted
+from hsp_control.edge.limit_share import Permitted
 from hsp_control.engine.plans import AnyCall, PartCall, PartCalls
 from hsp_control.robot import RobotState
 

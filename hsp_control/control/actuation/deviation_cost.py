@@ -37,13 +37,18 @@ class Levels(NamedTuple):
     # singular value of each level below which a direction belongs to it in part, shape
     # (levels,)
     thresholds: Array
+    units: Array
     factors: Factors  # law's pseudo-inverse of the stack
+    exact: Factors  # that of the exact law, where μ < 1
+    slack: Array  # of the priorities, shape (1,); see `limit_share`
     projectors: Projectors  # of its levels, where it was resolved level by level
     edge_level: Indices  # see `BoundLaw`, shape (1,)
     alone: bool  # see `BoundLaw`
 
     @classmethod
-    def of(cls, law: BoundLaw, supported: bool, size: float, held: Array) -> Self:
+    def of(
+        cls, law: BoundLaw, supported: bool, size: float, held: Array, slack: Array
+    ) -> Self:
         """Return a law's levels; ``supported``: the first is that of contacts."""
         levels = len(law.ends) - supported
         problem = law.problem
@@ -59,7 +64,10 @@ class Levels(NamedTuple):
             _LEAST ** (1.0 / max(levels, 1)),
             held,
             law.thresholds,
+            law.units,
             law.factors,
+            Factors(law.edge.Q, law.edge.X),
+            slack,
             law.projectors,
             law.edge_level,
             law.alone,

@@ -34,13 +34,8 @@ from hsp_control.control.actuation.dual_active_set import QP, Workspace
 from hsp_control.control.actuation.support import Support
 from hsp_control.edge import BoundLaw
 from hsp_control.edge.held_levels import held_levels
-from hsp_control.edge.limited_target import (
-    Barred,
-    Parts,
-    Permitted,
-    Within,
-    limited_target,
-)
+from hsp_control.edge.limit_share import Barred, Permitted, Within, limit_share
+from hsp_control.edge.limited_target import Parts, limited_target
 from hsp_control.engine.plans import AnyCall, OnlyIf, PartCall, PartCalls
 from hsp_control.robot import RobotState
 
@@ -144,22 +139,25 @@ def _at_the_edge(
     within: Within,
     permitted: Permitted,
     barred: Barred,
-) -> tuple[PartCalls, Array]:
-    """Return the calls that write the desired step and the costs of deviations."""
+) -> tuple[PartCalls, Array, Array]:
+    """Return the calls that write the desired step, costs of levels and the slack."""
     taken, (self_motions, brakings) = law.self_motions(state.v)
-    parted, (by_levels, factors) = law.by_levels(state.v)
+    parted, levels = law.by_levels(state.v)
+    limits = within, permitted, barred
+    rest = levels.at_rest[-1]
+    shared, shares = limit_share(*wanted, law, self_motions[0], rest, *limits)
     holding, held = held_levels(
         *wanted,
         law,
-        by_levels,
-        factors,
+        levels,
+        shares.slack,
         within,
         permitted.effort,
         barred,
     )
     parts = Parts(law.acceleration, law.edge.damped, *self_motions, *brakings)
-    target = limited_target(*wanted, parts, within, permitted, barred)
-    return [taken, parted, holding, target], held
+    target = limited_target(*wanted, parts, *limits, shares.by_limits)
+    return [taken, parted, shared, holding, target], held, shares.slack
 
 
 class LimitedStep:
@@ -278,14 +276,15 @@ class LimitedStep:
 
         rows: list[AnyCall] = [*state.inertia.calls, law.damped_beside(state.v)]
         # Minimum costs of deviations; with a floating base priorities are strict.
-        self.held = zeros(len(law.ends))
+        self.held, self.slack = zeros(len(law.ends)), np.ones(1)
         if permitted is not None:
             kept = slice(barriers, contacts)
             barred = Barred(A[kept], lower[kept])
             given = state, law, wanted, Within(*bounds[:2]), permitted, barred
-            target, self.held = _at_the_edge(*given)
+            target, self.held, self.slack = _at_the_edge(*given)
             rows += target
-        levels = Levels.of(law, p > 0, state.robot.size or 1.0, self.held)
+        costs = self.held, self.slack
+        levels = Levels.of(law, p > 0, state.robot.size or 1.0, *costs)
         rows.append(
             PartCall(engine.LimitedRows, **around, A=A, lower=lower, upper=upper)
         )

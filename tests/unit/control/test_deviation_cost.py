@@ -45,12 +45,10 @@ METRICS: dict[str, hsp.metrics.Metric] = {
 }
 
 
-def inverse_cost(law: BoundLaw, held: Array) -> Array:
+def inverse_cost(law: BoundLaw, held: Array, slack: float) -> Array:
     """Return J Jᵀ, which should equal H⁻¹."""
-    levels, directions = (
-        Levels.of(law, False, panda().size, held),
-        Directions.of(7),
-    )
+    levels = Levels.of(law, False, panda().size, held, np.array([slack]))
+    directions = Directions.of(7)
     JT, moving = np.zeros((7, 7)), np.zeros(1, dtype=np.int64)
     calls = [
         write_directions(levels, directions),
@@ -72,8 +70,9 @@ def test_levels_share_directions_as_the_law_does(
 ) -> None:
     """J Jᵀ H = 1 with log H from the levels' projectors.
 
-    Also where the smallest singular value is slightly above the threshold, or equal to
-    it up to rounding: then the spectrum may come from the exact law.
+    Of the damped law, of the exact one, where it is resolved, and of any mixture. Also
+    where the smallest singular value is slightly above the threshold, or equal to it up
+    to rounding: then the spectrum may come from the exact law.
     """
     robot, rng = panda(), np.random.default_rng(seed)
     posture = hsp.JointPosture(robot.home(), joints=["panda_joint2"], priority=2)
@@ -102,8 +101,11 @@ def test_levels_share_directions_as_the_law_does(
     planned([law.damped_beside(state.v)]).run(0.0)  # as with an active limit
     # from strict priorities to equal costs
     held = 10.0 ** rng.uniform(-7.0, 1.0, size=levels)
-    H = limit_oracle.deviation_cost(law, False, robot.size, held)
-    np.testing.assert_allclose(inverse_cost(law, held) @ H, np.eye(7), atol=1e-5)
+    mixed = law.edge_level[0] > 0 and law.edge.share[0] < 1.0
+    for slack in (0.0, rng.uniform(), 1.0) if mixed else (1.0,):
+        H = limit_oracle.deviation_cost(law, False, robot.size, held, slack)
+        inverse = inverse_cost(law, held, slack)
+        np.testing.assert_allclose(inverse @ H, np.eye(7), atol=1e-5)
 
 
 FIELD = 0.01 * hsp.JointCentering()

@@ -126,6 +126,7 @@ def test_it_is_the_optimum(name: str, spread: float, seed: int) -> None:
         weight,
         made.robot.size,
         made_by.held,
+        made_by.slack[0],
     )
     x = np.concatenate([a - wanted, forces / weight])
     scale = np.linalg.norm(qp.rows.A, axis=1) * (1.0 + np.abs(x).max())

@@ -17,8 +17,8 @@ from hsp_control.control.actuation.deviation_cost import (
     write_inverse_root,
 )
 from hsp_control.edge.held_levels import STIFFEST, held_levels
-from hsp_control.edge.limited_target import Barred, Within
-from hsp_control.edge.step import Factors, Projectors
+from hsp_control.edge.limit_share import Barred, Within
+from hsp_control.edge.step import ByLevels, Factors, Projectors
 from hsp_control.engine.plans import planned
 from hsp_control.law import CONSTANT, IDENTITY
 
@@ -34,6 +34,7 @@ class Law(NamedTuple):
     form: int
     ends: Array
     thresholds: Array
+    units: Array
 
 
 class Metric(NamedTuple):
@@ -64,13 +65,34 @@ def drawn(seed: int, size: float, L: Array | None = None) -> dict[str, Any]:
         "M": M,
         "a": a,
         "effort": M @ a + rng.normal(size=NV),
-        "law": Law(Problem(Metric(L)), law, CONSTANT, ends, thresholds),
-        "by_levels": size * rng.normal(size=(len(ENDS), NV)),
-        "factors": Factors(triangle @ B, triangle),
+        "law": Law(
+            Problem(Metric(L)),
+            law,
+            CONSTANT,
+            ends,
+            thresholds,
+            rng.uniform(1.0, 3.0, size=ENDS[-1]),
+        ),
+        "parts": ByLevels(
+            *(size * rng.normal(size=(2, len(ENDS), NV))),
+            Factors(triangle @ B, triangle),
+        ),
+        "slack": rng.choice([np.zeros(1), rng.uniform(size=1), np.ones(1)]),
         "bounds": Within(-away[0], away[1]),
         "permitted": 10.0 * rng.uniform(0.5, 2.0, size=NV),
         "barred": Barred(rng.normal(size=(2, NV)), -rng.uniform(1.0, 10.0, size=2)),
     }
+
+
+def at_rest(given: dict[str, Any], k: int) -> Array:
+    """Return how far the errors of the first levels alone command beyond each limit.
+
+    In an equilibrium no limit of motion is negative.
+    """
+    a, M, permitted = given["parts"].at_rest[k], given["M"], given["permitted"]
+    effort = given["effort"] + M @ (a - given["a"])
+    pushed = np.abs(effort) - permitted
+    return np.concatenate([a, -a, pushed, pushed, -given["barred"].A @ a])
 
 
 def excesses(given: dict[str, Any], change: Array) -> Array:
@@ -92,15 +114,19 @@ def costs(given: dict[str, Any]) -> list[float]:
     E, M = np.eye(NV), given["M"]
     rows = np.vstack([E, E, M, M, given["barred"].A]) @ L_inverse.T
     length = np.linalg.norm(rows, axis=1)
-    parts = (rows @ given["factors"].Q.T / length[:, None]) ** 2
-    # the part of each row that higher levels leave
-    left = 1.0 / np.diag(given["factors"].X)
+    Q, X = given["parts"].factors
+    parts, slack = (rows @ Q.T / length[:, None]) ** 2, given["slack"][0]
+    left = 1.0 / (
+        np.diag(X) * law.units
+    )  # the part of each row that higher levels leave
     found, start, of_level = [], 0, np.zeros(len(left))
     for k, end in enumerate(ENDS):
         s = np.minimum(left[start:end] / law.thresholds[k], 1.0)
-        of_level[start:end] = 1.0 - (1.0 - s**2) ** 2
-        own = excesses(given, given["by_levels"][k] - law.acceleration)
+        of_level[start:end] = 1.0 - slack * (1.0 - s**2) ** 2
+        own = excesses(given, given["parts"].by_levels[k] - law.acceleration)
         x = np.minimum(own, excesses(given, np.zeros(NV)))
+        persists = np.minimum(x, np.maximum(at_rest(given, k), 0.0))
+        x = np.where(x > 0.0, slack * x + (1.0 - slack) * persists, 0.0)
         n_square = 1.0 - parts[:, :end] @ of_level[:end]
         cost = joint * x / length / 1000.0 - n_square
         found.append(max(0.0, *cost[x > 0.0], 0.0))
@@ -110,8 +136,10 @@ def costs(given: dict[str, Any]) -> list[float]:
 
 @given(seeds, st.floats(10.0, 1e6))
 def test_it_is_the_plain_formula(seed: int, size: float) -> None:
-    """Levels' accelerations beyond a limit, less the share that lower ones can
-    absorb."""
+    """Levels' accelerations beyond a limit, less the share that lower ones can absorb.
+
+    Without slack it is what persists of them.
+    """
     requested = drawn(seed, size)
     call, held = held_levels(**requested)
     planned([call]).run(0.0)
@@ -159,7 +187,7 @@ def test_the_demand_of_a_level_does_not_depend_on_lower_ones(
         law = made._active.law
         assert far or law.edge_level[0] == 0
         calls = [law.call(v, beside=True), law.self_motions(v)[0]]
-        parted, (by_levels, _) = law.by_levels(v)
+        parted, (by_levels, *_) = law.by_levels(v)
         planned([*calls, parted]).run(0.0)
         found.append(by_levels[0].copy())
         if count == 1 and far and law.edge_level[0]:
@@ -167,9 +195,9 @@ def test_the_demand_of_a_level_does_not_depend_on_lower_ones(
     np.testing.assert_allclose(found[1], found[0], rtol=1e-7, atol=1e-7)
 
 
-@given(st.floats(0.0, 2.0 * np.pi), st.floats(-3.0, 5.0))
+@given(st.floats(0.0, 2.0 * np.pi), st.floats(-3.0, 5.0), st.floats(0.0, 1.0))
 def test_a_deviation_rotates_slowly_enough_for_a_period(
-    angle: float, exponent: float
+    angle: float, exponent: float, share: float
 ) -> None:
     """A task along one direction of a plane moves one joint x beyond its limit.
 
@@ -186,9 +214,11 @@ def test_a_deviation_rotates_slowly_enough_for_a_period(
             np.full(1, 1e-3),
         )
         metric, nothing = Problem(Metric(np.eye(2))), np.zeros(2)
-        law: Any = Law(metric, nothing, IDENTITY, ends, epsilon)
+        parts = ByLevels(np.zeros((1, 2)), np.array([[x, 0.0]]), factors)
+        slack = np.array([share])
+        law: Any = Law(metric, nothing, IDENTITY, ends, epsilon, np.ones(1))
         holding, held = held_levels(
-            np.eye(2), nothing, nothing, law, np.zeros((1, 2)), factors,
+            np.eye(2), nothing, nothing, law, parts, slack,
             Within(np.array([-np.inf, -np.inf]), np.array([-x, np.inf])),
             np.full(2, np.inf), Barred(np.zeros((0, 2)), np.zeros(0)),
         )  # fmt: skip
@@ -197,7 +227,8 @@ def test_a_deviation_rotates_slowly_enough_for_a_period(
             jacobian=row, L=np.eye(2), form=IDENTITY, ends=ends,
             error=np.zeros(1), springs=np.zeros(1, dtype=np.bool_), size=1.0,
             first=0, least=1e-6, held=held,
-            thresholds=epsilon, factors=factors,
+            thresholds=epsilon, units=law.units, factors=factors, exact=factors,
+            slack=slack,
             projectors=Projectors.allocate(1, 2),
             edge_level=np.zeros(1, dtype=np.int64), alone=True,
         )  # fmt: skip

@@ -1,20 +1,20 @@
 """The acceleration that a step approaches at an active limit, against formulas."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
 from hsp_control.common.arrays import Array
-from hsp_control.edge.limited_target import (
+from hsp_control.edge.limit_share import (
     LARGE,
     Barred,
-    Parts,
     Permitted,
     Within,
-    limited_target,
+    limit_share,
 )
+from hsp_control.edge.limited_target import Parts, limited_target
 from hsp_control.engine.plans import planned
 
 NV = 4
@@ -31,6 +31,7 @@ class Asked(NamedTuple):
     bounds: Within
     permitted: Permitted
     barred: Barred
+    share: Array  # of the damped law
 
 
 def drawn(seed: int, size: float, bound: float) -> Asked:
@@ -45,7 +46,7 @@ def drawn(seed: int, size: float, bound: float) -> Asked:
     rows = Barred(rng.normal(size=(2, NV)), -bound * rng.uniform(0.1, 1.0, size=2))
     return Asked(
         M, a, M @ a + rng.normal(size=NV), Parts(*parts), Within(-away[0], away[1]),
-        permitted, rows,
+        permitted, rows, rng.uniform(size=1),
     )  # fmt: skip
 
 
@@ -78,12 +79,11 @@ def called(given: Asked) -> Asked:
 
 @given(seeds, st.floats(0.1, 1e4))
 def test_it_is_the_plain_formula(seed: int, size: float) -> None:
-    """E_t/2 of the step is the damped law's; a factor 1/min(1 + E, r) of a field
+    """A share of the step is the damped law's; a factor 1/min(1 + E, r) of a field
     remains."""
     requested = drawn(seed, size, 10.0)
     law, damped, own, own_damped, braking, braking_damped = requested.parts
-    beyond = min(excess(requested, -own), excess(requested, np.zeros(NV)))
-    exact = 1.0 - min(beyond / LARGE, 1.0)
+    exact = 1.0 - requested.share[0]
     to_damped = (1.0 - exact) * (damped - law)
     field = exact * (own + braking) + (1.0 - exact) * (own_damped + braking_damped)
     times = min(1.0 + excess(requested, to_damped), times_permitted(requested, field))
@@ -108,6 +108,7 @@ def test_within_limits_nothing_changes(seed: int) -> None:
     requested = drawn(seed, 1e4, 10.0)
     requested.a[:] = 0.0
     requested.effort[:] = 0.0
+    requested.share[:] = 0.0
     np.testing.assert_array_equal(called(requested).a, requested.a)
 
 
@@ -142,3 +143,52 @@ def test_an_excess_without_end_leaves_finite_numbers() -> None:
     requested.bounds.upper[0] = requested.a[0] - 1.0
     found = called(requested)
     assert np.isfinite(found.a).all()
+
+
+# --- the share of the damped law, and the slack --------------------------------------
+
+
+class Law:
+    """The relevant part of a resolved law."""
+
+    def __init__(self, pulls: Array, share: float) -> None:
+        self.problem: Any = self
+        self.edge: Any = self
+        self.pulls, self.share = pulls, np.array([share])
+
+
+def shares(asked: Asked, law: Any, own: Array, at_rest: Array) -> list[float]:
+    """Return the share by limits, and the slack."""
+    limits = asked.bounds, asked.permitted, asked.barred
+    wanted = asked.M, asked.a, asked.effort
+    call, found = limit_share(*wanted, law, own, at_rest, *limits)
+    planned([call]).run(0.0)
+    return [float(each[0]) for each in found]
+
+
+@given(seeds, st.floats(0.1, 1e4), st.floats(0.0, 1e4))
+def test_the_share_is_the_plain_formula(seed: int, size: float, demand: float) -> None:
+    """min(E_t/2, r_f, 1); and the slack is r_f in what μ leaves."""
+    rng = np.random.default_rng(seed)
+    asked, own = drawn(seed, size, 10.0), size * rng.normal(size=NV)
+    at_rest, pulls = demand * rng.normal(size=NV), rng.uniform(0.0, 0.2, size=3)
+    law, nothing = Law(pulls, rng.uniform()), np.zeros(NV)
+    E_t = min(excess(asked, -own), excess(asked, nothing))
+    whole = 1e9 * at_rest  # so that the ratio is above 1, the oracle's least
+    r_f = times_permitted(asked, whole) / 1e9 if demand > 1e-6 else 0.0
+    r_f = max(r_f, float(np.linalg.norm(pulls)))
+    strict = (1.0 - min(r_f, 1.0)) * (1.0 - law.share[0])
+    expected = [min(E_t / LARGE, r_f, 1.0), 1.0 - strict]
+    # some 50 operations round; a demand below 1e-6 has a ratio of 1e-6 at most
+    found = shares(asked, law, own, at_rest)
+    np.testing.assert_allclose(found, expected, rtol=1e-10, atol=1e-11)
+
+
+@given(seeds, st.floats(1.0, 1e6))
+def test_tasks_that_are_met_keep_the_law_and_their_priority(
+    seed: int, size: float
+) -> None:
+    """Whatever is beyond limits: J'v of a self-motion, or the braking of a joint."""
+    asked = drawn(seed, size, 10.0)
+    own = np.random.default_rng(seed).normal(size=NV)
+    assert shares(asked, Law(np.zeros(3), 0.0), own, np.zeros(NV)) == [0.0, 0.0]

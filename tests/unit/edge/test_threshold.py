@@ -45,13 +45,15 @@ def written(
     pulls: float | Array = 0.0,
     whitened: float | Array = 1.0,
     turning: float = 0.0,
+    parts: list[int] | None = None,
 ) -> tuple[float, Thresholds]:
     """Return the thresholds of spring levels under load, or of other levels."""
-    m, thresholds = len(demand), Thresholds.allocate(len(ends))
+    m, thresholds = len(demand), Thresholds.allocate(len(ends), len(demand))
     J, pulling = np.ones((m, 7)), np.broadcast_to(pulls, m)
     springs = np.full(m, bool(pulling.any()))
     rows = {
         "ends": np.array(ends),
+        "parts": np.array(ends if parts is None else parts),
         "demand": demand,
         "yields": np.full(m, yields),
         "pulls": np.array(pulling),
@@ -98,7 +100,7 @@ def test_it_bounds_the_feedback_over_its_square(
     """‖f‖/ε² ≤ L + f_0/ε_0² for each level, and ε = ε_0 for small f.
 
     f_0 is that of legs; on a fixed base it is 0. In a metric that makes J L⁻ᵀ longer
-    than J the same holds for ε in its scale.
+    than J the same holds in the units of the rows, with ε_0 in the metric's own.
     """
     demand = 10.0**size * np.random.default_rng(seed).standard_normal(9)
     following = SLOW
@@ -114,7 +116,12 @@ def test_it_bounds_the_feedback_over_its_square(
             assert epsilon == LEAST
     few, exact = written(demand, ends, following, yields=3.0)[1].own, own > LEAST
     np.testing.assert_allclose(few[exact] ** 2, 3.0 * own[exact] ** 2)
-    np.testing.assert_allclose(scaled.own[exact], max(scale, 1.0) * own[exact])
+    unit = max(scale, 1.0)
+    np.testing.assert_allclose(scaled.units, unit, rtol=1e-14)
+    np.testing.assert_allclose(
+        scaled.own, np.maximum(np.where(exact, own, 0.0), scaled.own.min())
+    )
+    assert scaled.own.min() >= LEAST / unit * (1.0 - 1e-14)
     for counts, kind in ((1.0, NOT), (0.0, following)):
         assert (written(demand, ends, kind, yields=counts)[1].own == LEAST).all()
 
@@ -147,13 +154,26 @@ def test_a_level_below_follows_as_slowly_as_those_above_turn(
     """ε² = f size/(L s_1); and it is below s where all levels are resolved together."""
     rng, following = np.random.default_rng(seed), SLOW
     demand = 10.0**size * rng.standard_normal(6)
-    scales = 10.0 ** rng.uniform(-1.0, 1.0, (6, 1))
-    largest, thresholds = written(demand, [3, 6], following, whitened=scales)
+    largest, thresholds = written(demand, [3, 6], following)
     s = largest * 10.0 ** (log_s * rng.random(2))  # of both levels
-    above = s[0] / thresholds.scales[0]
-    below = threshold_below(np.zeros(3), 0.0, above, thresholds)
-    assert below**2 == pytest.approx(thresholds.follows[1] ** 2 * 0.8 / above)
+    below = threshold_below(np.zeros(3), 0.0, s[0], thresholds)
+    assert below**2 == pytest.approx(thresholds.follows[1] ** 2 * 0.8 / s[0])
     assert below <= s[1] * (1.0 + 1e-12)
+
+
+@given(seeds)
+def test_each_part_of_an_error_has_its_own_unit(seed: int) -> None:
+    """The ratio of its rows in the metric's coordinates and in the joints', at least 1.
+
+    So an inverse that light wrists make large damps no position.
+    """
+    scales = 10.0 ** np.random.default_rng(seed).uniform(-1.0, 2.0, 3)
+    rows = np.repeat(scales, 3)[:, None]
+    _, found = written(np.zeros(9), [6, 9], SLOW, whitened=rows, parts=[3, 6, 9])
+    expected = np.repeat(np.maximum(scales, 1.0), 3)
+    np.testing.assert_allclose(found.units, expected, rtol=1e-14)
+    _, plain = written(np.zeros(9), [6, 9], NOT, whitened=rows, parts=[3, 6, 9])
+    np.testing.assert_array_equal(plain.units, 1.0)  # an edge that is disabled
 
 
 @given(seeds, st.floats(0.01, 2.0))

@@ -76,7 +76,7 @@ def circle(**changed: Any) -> Any:
 def threshold_below(**changed: Any) -> Any:
     """Return a call with an integer among its numbers, with arguments changed."""
     given: dict[str, Any] = {"demand": np.zeros(3), "held": 0.0, "above": 1.0}
-    given |= {"level": 1, "following": NOT, "thresholds": Thresholds.allocate(2)}
+    given |= {"level": 1, "following": NOT, "thresholds": Thresholds.allocate(2, 2)}
     return engine.ThresholdBelow(**given | changed)
 
 
