@@ -17,6 +17,7 @@ struct BoundsOfMotion {
 // Far from the limits; inf where there is none.
 struct Permitted {
   In<'n'> effort, acceleration;
+  double bandwidth;  // α of the barriers [1/s]
 };
 
 // Rows of barriers for a deviation δ from the unconstrained a: A δ ≥ lower. The first n columns of

@@ -13,9 +13,9 @@
 //
 //   ρ = max_c (A/K - n²),      A = x max_j ‖L⁻¹e_j‖
 //
-// with A the largest joint acceleration due to x. What persists is the command of the errors at
-// rest, J# f: without slack x is at most what is beyond the limit of that. A limit that brakes a
-// self-motion costs a task that is met nothing. Of a direction of the singular value s below its
+// with A the largest joint acceleration due to x. What persists of x is the command of the errors at
+// rest, J# f. The rest is due to a motion, as far as a barrier demands that of a speed, 2 α c v: a
+// limit that brakes a self-motion costs a task that is met nothing, without slack. Of a direction of the singular value s below its
 // threshold ε a level has the share 1 - λ (1 - s²/ε²)², with λ the slack of `limit_share.hpp`.
 #pragma once
 #include <hsp/linalg.hpp>
@@ -32,6 +32,7 @@ struct HeldLevels {
       "levels beyond limits, which is bounded by that of a.";
   In<'n', 'n'> M, L;
   int form;
+  In<'n'> v;
   In<'n'> a;               // the unconstrained acceleration
   In<'n'> effort;          // M a + N, plus the compensators' part
   In<'n'> law;             // its part by the law
@@ -43,7 +44,7 @@ struct HeldLevels {
   In<'m'> units;           // D, in which singular values are, see `Thresholds`
   In<1> slack;             // λ
   BoundsOfMotion bounds;
-  In<'n'> permitted;  // efforts; inf where there is no limit
+  Permitted permitted;
   Barred<In> barred;
   double stiffest;  // K: maximum change of δ with its direction [1/s²]
   Out<'l'> held;
@@ -63,8 +64,9 @@ struct HeldLevels {
       change = by_levels.row(k).transpose() - law;
       effort_change.noalias() = M * change;
       rest = at_rest.row(k).transpose();
+      row = rest - a;
       effort_at_rest = effort;
-      effort_at_rest.noalias() += M * (rest - a);
+      effort_at_rest.noalias() += M * row;
       held[k] = cost(ends[k], longest / stiffest);
     }
   }
@@ -84,9 +86,11 @@ struct HeldLevels {
   // The largest of A/K - n² of all limits, 0 if there is none; `rows` belong to the levels.
   double cost(Index rows, double scale) {
     double most = 0.0;
-    // The limit in `row`, with the excess at rest.
-    const auto consider = [&](double excess, double persists) {
-      excess -= (1.0 - slack[0]) * std::max(excess - std::max(persists, 0.0), 0.0);
+    const double braked = 2.0 * permitted.bandwidth, inf = std::numeric_limits<double>::infinity();
+    // The limit in `row`, with the excess at rest; a motion along it accounts for the difference.
+    const auto consider = [&](double excess, double persists, double motion) {
+      const double moving = std::min(excess - std::max(persists, 0.0), motion);
+      excess -= (1.0 - slack[0]) * std::max(moving, 0.0);
       const double length = row.norm();
       double owned = 0.0;
       for (Index r = 0; r < rows; ++r) {
@@ -101,14 +105,14 @@ struct HeldLevels {
       const double below = bounds.lower[i] - std::max(x, x + dx);
       if (above > 0.0 || below > 0.0) {
         length_of_joint(i);
-        consider(std::max(above, below), above > 0.0 ? rest[i] : -rest[i]);
+        consider(std::max(above, below), above > 0.0 ? rest[i] : -rest[i], braked * std::abs(v[i]));
       }
       const double force = effort[i], df = effort_change[i];
-      const double push = std::min(force, force + df) - permitted[i];
-      const double pull = -permitted[i] - std::max(force, force + df);
+      const double push = std::min(force, force + df) - permitted.effort[i];
+      const double pull = -permitted.effort[i] - std::max(force, force + df);
       if (push > 0.0 || pull > 0.0) {
         whiten_row(M.col(i));
-        consider(std::max(push, pull), std::abs(effort_at_rest[i]) - permitted[i]);
+        consider(std::max(push, pull), std::abs(effort_at_rest[i]) - permitted.effort[i], inf);
       }
     }
     for (Index r = 0; r < barred.lower.size(); ++r) {
@@ -116,7 +120,7 @@ struct HeldLevels {
       const double missing = barred.lower[r] - std::max(own.dot(change), 0.0);
       if (missing > 0.0) {
         whiten_row(own);
-        consider(missing, -own.dot(rest));
+        consider(missing, -own.dot(rest), braked * std::abs(own.dot(v)));
       }
     }
     return most;

@@ -76,7 +76,7 @@ struct Resolve {
     const auto& J = law.task.jacobian;
     if (J.rows() > J.cols()) return false;
     const bool exact = exact_inverse(memory.B, threshold, Q, X, memory.square);
-    X *= thresholds.units.cwiseInverse().asDiagonal();
+    X.array().rowwise() /= thresholds.units.transpose().array();
     if (!exact) return false;
     write_law(law, inverse(Q, X), memory.law, e_N, a);
     return alone || is_finite();
@@ -123,7 +123,7 @@ struct Resolve {
   int damped_at_once(double threshold) {
     auto& [Q, X] = factors;
     damped_inverse(memory.B, threshold, Q, X);
-    X *= thresholds.units.cwiseInverse().asDiagonal();
+    X.array().rowwise() /= thresholds.units.transpose().array();
     write_law(law, inverse(Q, X), memory.law, e_N, a);
     return 1;
   }

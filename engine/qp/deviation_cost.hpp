@@ -149,7 +149,7 @@ struct Directions {
   // last of them may have singular values below the threshold: these are left out.
   Index write_levels(Index levels) {
     whiten(jacobian, L, form, B);
-    B = units.cwiseInverse().asDiagonal() * B;
+    B.array().colwise() /= units.array();
     Index count = 0, start = 0;
     for (Index k = 0; k < levels; ++k) {
       auto rows = B.middleRows(start, ends[k] - start);

@@ -13,7 +13,7 @@ import numpy as np
 from hsp_control import engine
 from hsp_control.common.arrays import Array
 from hsp_control.edge.bound_law import BoundLaw
-from hsp_control.edge.limit_share import Barred, Within
+from hsp_control.edge.limit_share import Barred, Permitted, Within
 from hsp_control.edge.step import ByLevels
 from hsp_control.engine.plans import PartCall
 
@@ -27,11 +27,12 @@ def held_levels(
     M: Array,
     a: Array,
     effort: Array,
+    v: Array,
     law: BoundLaw,
     parts: ByLevels,
     slack: Array,
     bounds: Within,
-    permitted: Array,
+    permitted: Permitted,
     barred: Barred,
 ) -> tuple[PartCall, Array]:
     """Return the call that writes the minimum costs below each level.
@@ -40,11 +41,12 @@ def held_levels(
         M: Mass matrix, shape (nv, nv).
         a: The law's acceleration, and that of compensators, shape (nv,).
         effort: M a + N, and the compensators' effort, shape (nv,).
+        v: Velocity, shape (nv,).
         law: The law.
         parts: Contributions of the first levels to it.
         slack: Of the priorities, shape (1,); see `limit_share`.
         bounds: Bounds on the acceleration.
-        permitted: Maximum efforts, inf where there is no limit, shape (nv,).
+        permitted: The bounds far from all limits, and the barriers' bandwidth.
         barred: Rows of barriers, for deviations from a.
 
     Returns:
@@ -57,6 +59,7 @@ def held_levels(
         M=M,
         L=metric.L,
         form=law.form,
+        v=v,
         a=a,
         effort=effort,
         law=law.acceleration,

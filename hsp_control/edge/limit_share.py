@@ -32,6 +32,7 @@ class Permitted(NamedTuple):
 
     effort: Array  # [N·m or N]
     acceleration: Array  # [rad/s² or m/s²]
+    bandwidth: float  # α of the barriers [1/s]
 
     @classmethod
     def by(
@@ -47,7 +48,7 @@ class Permitted(NamedTuple):
             bandwidth: α of the barriers that keep positions and speeds [1/s].
         """
         acceleration = np.minimum(bandwidth * speed, bandwidth**2 * (0.5 * span))
-        return cls(np.array(effort), np.minimum(acceleration, most))
+        return cls(np.array(effort), np.minimum(acceleration, most), float(bandwidth))
 
 
 class Within(NamedTuple):

@@ -148,12 +148,11 @@ def _at_the_edge(
     shared, shares = limit_share(*wanted, law, self_motions[0], rest, *limits)
     holding, held = held_levels(
         *wanted,
+        state.v,
         law,
         levels,
         shares.slack,
-        within,
-        permitted.effort,
-        barred,
+        *limits,
     )
     parts = Parts(law.acceleration, law.edge.damped, *self_motions, *brakings)
     target = limited_target(*wanted, parts, *limits, shares.by_limits)

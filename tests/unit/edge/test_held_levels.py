@@ -17,7 +17,7 @@ from hsp_control.control.actuation.deviation_cost import (
     write_inverse_root,
 )
 from hsp_control.edge.held_levels import STIFFEST, held_levels
-from hsp_control.edge.limit_share import Barred, Within
+from hsp_control.edge.limit_share import Barred, Permitted, Within
 from hsp_control.edge.step import ByLevels, Factors, Projectors
 from hsp_control.engine.plans import planned
 from hsp_control.law import CONSTANT, IDENTITY
@@ -65,6 +65,7 @@ def drawn(seed: int, size: float, L: Array | None = None) -> dict[str, Any]:
         "M": M,
         "a": a,
         "effort": M @ a + rng.normal(size=NV),
+        "v": 0.1 * size * rng.normal(size=NV),
         "law": Law(
             Problem(Metric(L)),
             law,
@@ -79,7 +80,7 @@ def drawn(seed: int, size: float, L: Array | None = None) -> dict[str, Any]:
         ),
         "slack": rng.choice([np.zeros(1), rng.uniform(size=1), np.ones(1)]),
         "bounds": Within(-away[0], away[1]),
-        "permitted": 10.0 * rng.uniform(0.5, 2.0, size=NV),
+        "permitted": Permitted(*(10.0 * rng.uniform(0.5, 2.0, size=(2, NV))), 10.0),
         "barred": Barred(rng.normal(size=(2, NV)), -rng.uniform(1.0, 10.0, size=2)),
     }
 
@@ -91,15 +92,22 @@ def at_rest(given: dict[str, Any], k: int) -> Array:
     """
     a, M, permitted = given["parts"].at_rest[k], given["M"], given["permitted"]
     effort = given["effort"] + M @ (a - given["a"])
-    pushed = np.abs(effort) - permitted
+    pushed = np.abs(effort) - permitted.effort
     return np.concatenate([a, -a, pushed, pushed, -given["barred"].A @ a])
+
+
+def braked(given: dict[str, Any]) -> Array:
+    """Return how much each limit demands of a motion, 2 α c v; an effort's anything."""
+    v, A = given["v"], given["barred"].A
+    rates = np.abs([*v, *v, *np.full(2 * NV, np.inf), *(A @ v)])
+    return 2.0 * given["permitted"].bandwidth * rates
 
 
 def excesses(given: dict[str, Any], change: Array) -> Array:
     """Return how far a + change is beyond each limit."""
     a, effort = given["a"] + change, given["effort"] + given["M"] @ change
     missing = given["barred"].lower - given["barred"].A @ change
-    bounds, permitted = given["bounds"], given["permitted"]
+    bounds, permitted = given["bounds"], given["permitted"].effort
     return np.concatenate(
         [a - bounds.upper, bounds.lower - a, effort - permitted, -effort - permitted,
          missing]
@@ -116,17 +124,17 @@ def costs(given: dict[str, Any]) -> list[float]:
     length = np.linalg.norm(rows, axis=1)
     Q, X = given["parts"].factors
     parts, slack = (rows @ Q.T / length[:, None]) ** 2, given["slack"][0]
-    left = 1.0 / (
-        np.diag(X) * law.units
-    )  # the part of each row that higher levels leave
+    # the part of each row that higher levels leave
+    left = 1.0 / (np.diag(X) * law.units)
     found, start, of_level = [], 0, np.zeros(len(left))
     for k, end in enumerate(ENDS):
         s = np.minimum(left[start:end] / law.thresholds[k], 1.0)
         of_level[start:end] = 1.0 - slack * (1.0 - s**2) ** 2
         own = excesses(given, given["parts"].by_levels[k] - law.acceleration)
         x = np.minimum(own, excesses(given, np.zeros(NV)))
-        persists = np.minimum(x, np.maximum(at_rest(given, k), 0.0))
-        x = np.where(x > 0.0, slack * x + (1.0 - slack) * persists, 0.0)
+        beyond_rest = np.maximum(x - np.maximum(at_rest(given, k), 0.0), 0.0)
+        of_motion = np.minimum(beyond_rest, braked(given))
+        x = np.where(x > 0.0, x - (1.0 - slack) * of_motion, 0.0)
         n_square = 1.0 - parts[:, :end] @ of_level[:end]
         cost = joint * x / length / 1000.0 - n_square
         found.append(max(0.0, *cost[x > 0.0], 0.0))
@@ -138,7 +146,7 @@ def costs(given: dict[str, Any]) -> list[float]:
 def test_it_is_the_plain_formula(seed: int, size: float) -> None:
     """Levels' accelerations beyond a limit, less the share that lower ones can absorb.
 
-    Without slack it is what persists of them.
+    Without slack it is what no motion accounts for: what persists of them.
     """
     requested = drawn(seed, size)
     call, held = held_levels(**requested)
@@ -218,9 +226,10 @@ def test_a_deviation_rotates_slowly_enough_for_a_period(
         slack = np.array([share])
         law: Any = Law(metric, nothing, IDENTITY, ends, epsilon, np.ones(1))
         holding, held = held_levels(
-            np.eye(2), nothing, nothing, law, parts, slack,
+            np.eye(2), nothing, nothing, nothing, law, parts, slack,
             Within(np.array([-np.inf, -np.inf]), np.array([-x, np.inf])),
-            np.full(2, np.inf), Barred(np.zeros((0, 2)), np.zeros(0)),
+            Permitted(*np.full((2, 2), np.inf), 10.0),
+            Barred(np.zeros((0, 2)), np.zeros(0)),
         )  # fmt: skip
         directions = Directions.of(2)
         levels = Levels(

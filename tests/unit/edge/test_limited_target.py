@@ -42,7 +42,7 @@ def drawn(seed: int, size: float, bound: float) -> Asked:
     a, *parts = size * rng.normal(size=(1 + len(Parts._fields), NV))
     parts[0] = a.copy()
     away = bound * rng.uniform(0.1, 1.0, size=(2, NV))
-    permitted = Permitted(*(bound * rng.uniform(0.5, 2.0, size=(2, NV))))
+    permitted = Permitted(*(bound * rng.uniform(0.5, 2.0, size=(2, NV))), 10.0)
     rows = Barred(rng.normal(size=(2, NV)), -bound * rng.uniform(0.1, 1.0, size=2))
     return Asked(
         M, a, M @ a + rng.normal(size=NV), Parts(*parts), Within(-away[0], away[1]),
