@@ -215,12 +215,12 @@ class GripperClient:
         if sender != self.sender and monotonic() - self.last_time < _SILENCE:
             known, other = (":".join(map(str, who)) for who in (self.sender, sender))
             raise ValueError(f"{other} is ignored while {known} sends")
-        self.sender, self.last_time = sender, monotonic()
         numbers = value if isinstance(value, list) else []
         if len(numbers) != 1 or type(numbers[0]) not in (int, float):
             raise ValueError(f"the value is {str(value)[:40]}; needs [OPENING]")
         if not 0.0 <= (opening := float(numbers[0])) <= 1.0:
             raise ValueError(f"the opening is {opening} m; needs 0 to 1")
+        self.sender, self.last_time = sender, monotonic()
         return opening
 
     def move(self, opening: float) -> None:

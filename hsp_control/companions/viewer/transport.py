@@ -234,15 +234,22 @@ def page_key(host: str, *, fresh: bool = False) -> str:
         cache = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
         file = Path(cache) / "hsp_control" / "page-key"
         file.parent.mkdir(parents=True, exist_ok=True)
-        with suppress(FileExistsError):
-            opened = os.open(file, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
-            os.write(opened, new.encode())
-            os.close(opened)
+        if not file.exists():
+            _write_once(file, new)
         about, kept = file.stat(), file.read_text()
     except (OSError, RuntimeError, UnicodeDecodeError):  # it cannot be written
         return new
     private = about.st_uid == os.getuid() and not about.st_mode & 0o077
     return kept if private and len(kept) == len(new) else new
+
+
+def _write_once(file: Path, text: str) -> None:
+    """Write a file for this user alone, whole or not at all, if there is none."""
+    with tempfile.NamedTemporaryFile("w", dir=file.parent) as draft:
+        draft.write(text)
+        draft.flush()
+        with suppress(FileExistsError):  # of another start at this moment
+            os.link(draft.name, file)
 
 
 def meshcat_page() -> Path:

@@ -15,12 +15,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 from places import ON_MUJOCO
+from robot_texts import link, robot_xml
 from wording import wording
 
 import hsp_control as hsp
 from hsp_control import NullSpaceField, Rollout, __version__, load_experiment
 from hsp_control.cli import doctor, main, options, robot_table, stopwatch
-from hsp_control.cli.check import start_advice
+from hsp_control.cli.check import _where_exact, start_advice
 from hsp_control.cli.interrupts import DeferredInterrupt
 
 MOVING = "paper/4_moving_obstacle"
@@ -511,3 +512,84 @@ def test_check_prints_the_change_of_an_effort_in_a_millisecond(
     assert main(["check", "panda_limits"]) == 0
     text = " ".join(capsys.readouterr().out.split())
     assert f"at most {1e-3 * rate:.2g} N·m or N in 1 ms" in text
+
+
+def test_a_robot_s_limits_are_in_the_columns_of_their_names(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """Those of the last joint of a Panda: 2.8973 rad, 2.61 rad/s, 12 N·m."""
+    assert main(["robots", "panda"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    (heading,) = (line for line in lines if line.startswith("dof "))
+    assert heading.split()[1:] == [
+        "lower",
+        "upper",
+        "speed",
+        "limit",
+        "effort",
+        "limit",
+    ]
+    (last,) = (line for line in lines if line.startswith("panda_joint7 "))
+    assert last.split()[1:] == ["-2.897", "2.897", "2.61", "12"]
+
+
+def test_doctor_marks_what_does_not_work_and_notes_the_rest(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    checks = [
+        doctor.Check("good", "ok", "fine"),
+        doctor.Check("slow", "note", "late", "hurry"),
+        doctor.Check("broken", "bad", "gone"),
+    ]
+    for name in ("_versions", "_companions", "_real_time", "_extras"):
+        monkeypatch.setattr(doctor, name, list)
+    monkeypatch.setattr(doctor, "_dynamics", lambda: checks[0])
+    monkeypatch.setattr(doctor, "_threads", lambda: checks[1])
+    assert main(["doctor"]) == 0
+    monkeypatch.setattr(doctor, "_extras", lambda: checks[2:])
+    assert main(["doctor"]) == 2
+    *_, good, slow, advice, broken = capsys.readouterr().out.splitlines()
+    assert [line[:2] for line in (good, slow, advice, broken)] == [
+        "  ",
+        "- ",
+        "  ",
+        "! ",
+    ]
+    assert [good.split(), slow.split(), advice.split(), broken.split()] == [
+        ["good", "fine"], ["-", "slow", "late"], ["hurry"], ["!", "broken", "gone"],
+    ]  # fmt: skip
+
+
+def test_the_unit_of_the_largest_effort_is_that_of_its_joint(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A lift carries the weight of 4 kg; the plate on it turns about the vertical."""
+    limit = '<limit lower="-1" upper="1" effort="90" velocity="1"/>'
+    joints = [
+        f'<joint name="{name}" type="{kind}"><parent link="{parent}"/>'
+        f'<child link="{child}"/><axis xyz="0 0 1"/>{limit}</joint>'
+        for name, kind, parent, child in (
+            ("lift", "prismatic", "base", "column"),
+            ("turn", "revolute", "column", "plate"),
+        )
+    ]
+    urdf, config = tmp_path / "lift.urdf", tmp_path / "lift.yaml"
+    links = [link(name) for name in ("base", "column", "plate")]
+    urdf.write_text(robot_xml(*links, *joints))
+    config.write_text(f"robot: {{name: {urdf}}}\ntasks: {{q: {{type: joint_posture}}}}")
+    assert main(["check", str(config)]) == 0
+    (line,) = [
+        each.split()
+        for each in capsys.readouterr().out.splitlines()
+        if each.startswith("largest effort")
+    ]
+    assert line == ["largest", "effort", "39.2", "N", "at", "the", "start"]
+
+
+def test_check_prints_in_degrees_where_the_law_is_exact() -> None:
+    errors = {"hand position": [0.012, "m"], "hand orientation": [0.6, "rad"]}
+    words = _where_exact(
+        {"errors": errors, "singular_value": 0.05, "singular_value_at_start": 0.31}
+    )
+    assert words.startswith("hand position below 0.012 m, hand orientation below 34°; ")
+    assert words.endswith(" J is above 0.05 (0.31 at the start)")

@@ -9,16 +9,18 @@ import pytest
 
 import hsp_control as hsp
 from hsp_control import RobotState, Rollout
-from hsp_control.cli import live
+from hsp_control.cli import live, robot_process
 from hsp_control.cli.live_experiment import simulated_robot
+from hsp_control.cli.robot_process import RobotProcess
 from hsp_control.cli.true_run import with_tasks
 from hsp_control.common.errors import LiveError
 from hsp_control.companions.viewer import ComparedRun, robot_of
 from hsp_control.companions.viewer.packing import ArrayTable
 from hsp_control.companions.viewer.page_plots import pack_panels
-from hsp_control.live import InProcessRobot, Phase
+from hsp_control.live import InProcessRobot, Phase, SimulatedRobot
 from hsp_control.live.live_log import live_channels
 from hsp_control.live.report import Deadlines
+from hsp_control.live.udp import ServerReport
 from hsp_control.simulation.limit_excess import POSITION, VELOCITY, LimitExcess
 from hsp_control.simulation.log_writer import LogWriter
 
@@ -201,3 +203,57 @@ def test_times_of_a_loop_are_printed_in_microseconds() -> None:
     heading, *numbers = table.columns
     assert str(heading.header) == "mine at 1000 Hz, times in µs"
     assert [list(each.cells) for each in numbers] == 4 * [["250", "1200"]]
+
+
+def test_a_rehearsal_leaves_no_effort_in_the_drives() -> None:
+    drives = {"drives": {"delay": {"periods": 2}}}
+    experiment = hsp.load_experiment(
+        CONFIG | {"plant": {"type": "rigid_body"} | drives}
+    )
+    robot, tau = simulated_robot(experiment), np.arange(7.0)
+    robot_process._warm_up(robot, experiment)
+    logged = robot.plant.log_channels(0.0, robot.q, robot.v, tau)
+    np.testing.assert_array_equal(logged["applied.tau"].value, tau)  # none before
+
+
+def test_a_closed_robot_process_leaves_no_socket() -> None:
+    robot = RobotProcess(hsp.load_experiment(CONFIG))
+    robot.close()
+    assert robot.hardware.link._socket.fileno() == -1
+
+
+def test_a_robot_reports_the_speed_of_its_fastest_joint(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def serve(robot: SimulatedRobot, *_: object, **__: object) -> ServerReport:
+        robot.v[:2] = 1.0, -2.0
+        return ServerReport()
+
+    monkeypatch.setattr(robot_process, "serve", serve)
+    ours = RobotProcess(hsp.load_experiment(CONFIG))
+    report = robot_process._run(ours._settings, lambda: None)
+    ours.close()
+    assert report["speed"] == 2.0
+
+
+@pytest.mark.parametrize(
+    ("rests", "silent", "words"),
+    [
+        (True, False, "held the robot"),
+        (False, False, "could not bring the robot to rest"),
+        (False, True, "fell silent"),
+    ],
+)
+def test_the_end_of_both_processes_is_printed(
+    rests: bool, silent: bool, words: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    report: Any = SimpleNamespace(
+        deadlines=Deadlines(0.001), reason="over", silent=silent, at_rest=rests,
+        t=1.25, speed=0.3,
+    )  # fmt: skip
+    robot = {"reason": "closed", "phase": "holding", "t": 2.5, "speed": 0.04}
+    live._print_ends(report, robot)
+    _, loop, its = capsys.readouterr().out.splitlines()
+    assert loop == f"The loop: over, at t = 1.250 s; {words}, the fastest joint at 0.3"
+    assert its.startswith("The robot: closed; holding at t = 2.500 s, the fastest ")
+    assert its.endswith(" 0.04")

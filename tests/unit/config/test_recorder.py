@@ -11,6 +11,8 @@ from robot_cases import load
 
 import hsp_control as hsp
 from hsp_control.common.errors import ConfigError, LogError
+from hsp_control.simulation.journal import JournalWriter
+from hsp_control.simulation.log_writer import LogWriter
 
 PERIOD = 1e-3
 
@@ -195,3 +197,27 @@ def test_an_unclosed_recorder_is_named_until_it_is_freed(
     del open_one
     with hsp.Recorder(controller, path) as recorder:
         run(controller, recorder, 30)
+
+
+def test_a_recorder_in_memory_leaves_no_folder_after_an_error() -> None:
+    recorder = hsp.Recorder(law(hsp.JointCentering()))
+    assert recorder.journal.exists()
+    with pytest.raises(ValueError, match="early"), recorder:
+        raise ValueError("early")
+    assert not recorder.journal.parent.exists()
+
+
+def test_a_log_whose_end_cannot_be_written_is_closed_all_the_same(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    controller = law(hsp.JointCentering())
+    recorder = hsp.Recorder(controller, tmp_path / "mine.npz")
+    run(controller, recorder, 3)
+
+    def full(*_: object) -> None:
+        raise LogError("the disk is full")
+
+    monkeypatch.setattr(LogWriter, "end", full)
+    with pytest.raises(LogError, match="the disk is full"):
+        recorder.close()
+    JournalWriter(recorder.journal).close()

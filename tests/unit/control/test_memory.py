@@ -118,3 +118,23 @@ def _plain(memory: RunMemory) -> dict[str, object]:
     """Return the contents of a memory in a form that can be compared."""
     fields = vars(memory) | {"sent": vars(memory.sent), "clock": vars(memory.clock)}
     return {name: pickle.dumps(each) for name, each in fields.items()}
+
+
+def test_a_new_run_has_neither_changes_nor_forces_of_the_last_one() -> None:
+    """A change that no step has seen belongs to the run in which it was made."""
+    made = controller()
+    computed(made, 0)
+    made.at(0.1).impedance("hand", hsp.Impedance([400.0] * 3 + [20.0] * 3))
+    made._memory.force_offset("sole")[:] = 5.0
+    assert made._memory.not_seen(0.0)
+    made.restart()
+    assert made._memory.not_seen(0.0) == ()
+    assert made._memory.force_offset("sole") == 0.0
+
+
+def test_a_rehearsal_teaches_nothing_about_the_clock() -> None:
+    memory = RunMemory.of(7)
+    memory.motion.latest = 1.0
+    with memory.kept():
+        memory.motion.latest = 2.0
+    assert memory.motion.latest == 1.0

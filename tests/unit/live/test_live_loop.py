@@ -383,3 +383,12 @@ def test_the_first_reason_to_stop_is_kept() -> None:
     requests.stop("the door is open")
     requests.stop("the page has ended", fault=True)
     assert (requests.reason, requests.fault) == ("the door is open", False)
+
+
+def test_the_first_interval_begins_after_the_preparation() -> None:
+    rig = Rig()
+    report = run_loop(
+        law(), rig, duration=0.01, clock=lambda: (rig.reads > 0) + PERIOD * rig.reads
+    )
+    assert report.deadlines.interval is not None
+    assert report.deadlines.interval.worst == pytest.approx(PERIOD)

@@ -455,3 +455,10 @@ def test_our_returned_packets_are_foreign() -> None:
     assert kinds == [PacketKind.BYE]
     for link in (loop, robot):
         link.close()
+
+
+def test_late_packets_are_sent_once_before_the_end() -> None:
+    """There are several packets of the end, as one may be lost."""
+    injector = FaultInjector(Faults(late=1.0))
+    assert injector.apply(b"late") == []
+    assert [injector.flush() for _ in range(3)] == [[b"late"], [], []]

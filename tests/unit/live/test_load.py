@@ -4,13 +4,14 @@ it."""
 import numpy as np
 import pinocchio as pin
 import pytest
-from live_rigs import PERIOD, panda, start
+from live_rigs import PERIOD, Rig, law, panda, start
 
 import hsp_control as hsp
 from hsp_control.common.arrays import Array, Flags
-from hsp_control.live import InProcessRobot, SimulatedRobot
+from hsp_control.live import InProcessRobot, SimulatedRobot, loop, run_loop
 from hsp_control.live.safe_stop import SafeStop
 from hsp_control.live.settings import StopSettings
+from hsp_control.robot import RobotState
 
 LIMITS = np.full(7, 100.0)
 """Effort limits [N·m]; a load may thus be 30 N·m."""
@@ -169,3 +170,25 @@ def test_a_stop_early_in_a_run_still_learns_the_load() -> None:
         clock=lambda: simulated.t,
     )
     assert (report.ended, report.at_rest) == ("completed", True), report.reason
+
+
+def test_a_load_is_learned_in_the_run_not_in_its_rehearsal(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    learned: list[str] = []
+
+    class Watched(SafeStop):
+        def observe(self, state: RobotState, acts: Array, silent: Flags) -> None:
+            learned.append("observed")
+            super().observe(state, acts, silent)
+
+        def restart(self) -> None:
+            learned.append("forgotten")
+            super().restart()
+
+    monkeypatch.setattr(loop, "SafeStop", Watched)
+    rig = Rig()
+    run_loop(law(), rig, duration=0.01)
+    rehearsed = learned.index("forgotten")
+    assert 0 < rehearsed < rig.reads
+    assert learned.count("observed") - rehearsed == len(rig.sent)

@@ -105,3 +105,14 @@ def test_a_heavier_joint_follows_a_steady_effort_by_less(sign: float) -> None:
         both = np.stack([v, v])
         momentum.update(both, both, Driving(INERTIA, effort, ZERO), PERIOD)
         assert not momentum.beyond.any(), k
+
+
+def test_efforts_before_a_gap_explain_no_motion_after_it() -> None:
+    momentum, v = check(), np.zeros(7)
+    for k in range(300):
+        effort = (100.0 if k < 100 else 0.0) * ONE
+        v = v + PERIOD * effort / np.diag(INERTIA)
+        both = np.stack([v, v])
+        passed = 0.09 if k == 100 else PERIOD
+        momentum.update(both, both, Driving(INERTIA, effort, ZERO), passed)
+        assert not momentum.beyond.any(), k

@@ -208,3 +208,25 @@ def test_after_a_restart_a_quiet_sensor_is_not_one_whose_noise_has_vanished() ->
         sensors.judge(q, rest, tau)
         assert sensors.dead.all() == (not restarted)
         assert sensors.dead.any() == (not restarted)
+
+
+def test_before_a_restart_no_joint_has_moved() -> None:
+    check, v = VelocityCheck(panda(), SETTINGS, PERIOD), np.ones(7)
+    for restarted in (False, True):
+        for _ in range(100):
+            check.update(PERIOD * v, v, PERIOD)
+        if restarted:
+            check.restart()
+        check.update(np.zeros(7), v, PERIOD)  # as if it braked in this period
+        assert check.doubtful.all() == restarted
+        assert check.doubtful.any() == restarted
+
+
+def test_a_new_beginning_lacks_no_acceleration() -> None:
+    expected = ExpectedMotion(panda(), 0.3, PERIOD, panda().dynamics())
+    both, v = np.ones((2, 7), dtype=bool), np.ones(7)
+    for braked in (False, True):
+        expected.follow(np.stack([v, v]), both, PERIOD, braked=braked)
+    expected.begin(v)
+    expected.advance(PERIOD)
+    np.testing.assert_array_equal(expected.v, np.ones((3, 7)))

@@ -90,3 +90,16 @@ def test_after_a_lost_state_an_effort_is_near_the_one_before_it_too(
         steps.append((limiter.sent - before)[3])  # of 1 N·m
         limiter.no_measurement()
     np.testing.assert_allclose(steps, [1.0] * held + [2.0, 3.0, 4.0], atol=1e-9)
+
+
+def test_a_reset_forgets_that_a_robot_reports_its_efforts() -> None:
+    slow = LiveSettings(effort_rate=100.0)
+    new, used = (EffortLimiter(panda(), slow, PERIOD) for _ in range(2))
+    used.reset(start())
+    used.robot_has(used.sent + 0.1)
+    for limiter in (new, used):
+        limiter.reset(start())
+        for _ in range(2):
+            limiter.apply(limiter.effort_limits, start())
+            limiter.no_measurement()
+    np.testing.assert_array_equal(used.sent, new.sent)

@@ -1,5 +1,6 @@
 """The journal of a log: all complete rows can be read, however its writer ends."""
 
+import fcntl
 import os
 import shutil
 import signal
@@ -496,3 +497,18 @@ def test_it_goes_on_after_a_torn_frame(torn: bytes, tmp_path: Path) -> None:
         reader.path.write_bytes(reader.path.read_bytes() + torn)
     with pytest.raises(LogError, match="the journal is a sweep's"):
         Rollout.load(reader.path)
+
+
+def test_a_journal_that_another_process_writes_is_not_said_to_be_ours(
+    tmp_path: Path,
+) -> None:
+    path = tmp_path / "a.journal"
+    ours = JournalWriter(path)
+    with pytest.raises(LogError, match="this program writes it already"):
+        JournalWriter(path)
+    ours.close()
+    with path.open("r+b") as theirs:
+        fcntl.flock(theirs, fcntl.LOCK_EX)
+        with pytest.raises(LogError, match="another process writes it"):
+            JournalWriter(path)
+    JournalWriter(path).close()

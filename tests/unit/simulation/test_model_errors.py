@@ -10,7 +10,7 @@ import hsp_control as hsp
 from hsp_control.common.arrays import Array
 from hsp_control.control.compensation import Compensation
 from hsp_control.robot.integrators import Rk4
-from hsp_control.simulation.model_errors import ModelErrors, lines, model_errors
+from hsp_control.simulation.model_errors import ModelErrors, Moved, lines, model_errors
 from hsp_control.simulation.plants import (
     ImperfectPlant,
     IntegratedPlant,
@@ -139,3 +139,24 @@ def test_it_has_no_answer_where_the_loop_is_not_that_of_an_arm() -> None:
     hand = hsp.FramePosition(walker.end_effector)
     floating = hsp.Controller(walker, [hand], base="driven")
     assert model_errors(floating, walker.home(), H, Compensation()) is None
+
+
+def test_the_table_has_millimetres_degrees_and_the_joint_that_moves_most() -> None:
+    resting, peak = np.array([0.02, 0.001]), np.array([0.003, 0.004])
+    moved = [
+        Moved("hand", part, unit, resting, peak)
+        for part, unit in (("position", "m"), ("orientation", "rad"))
+    ]
+    found = lines(
+        ModelErrors(
+            tuple(moved), ("first", "second"), 0.0125, 0.03, 0, 8, 0.0, np.inf, 0.004
+        )
+    )
+    assert found["1 N·m unknown, hand position"] == (
+        "20, 1 mm by joint without an observer, at most 4 mm (second) as it is"
+    )
+    assert found["1 N·m unknown, hand orientation"] == (
+        "1.1, 0.057 ° by joint without an observer, at most 0.23 ° (second) as it is"
+    )
+    assert found["tolerates"] == "a delay of 12.5 ms, or a lag of 30 ms"
+    assert "at most 4 ms of delay is tolerated" in found["rotors hidden"]

@@ -27,7 +27,8 @@ from hsp_control.trajectories.streams.followed import (
     FollowedOrientation,
     FollowedPose,
 )
-from hsp_control.trajectories.streams.message import Message
+from hsp_control.trajectories.streams.inbox import Inbox, Reader
+from hsp_control.trajectories.streams.message import Message, Space
 from hsp_control.trajectories.streams.planner import Planner, Room
 from hsp_control.trajectories.streams.sources import read_recording
 
@@ -611,3 +612,14 @@ def test_a_spin_goes_on_beyond_half_a_turn() -> None:
         R, omega, _ = samples[round((1.1 + k) / H)].orientation
         np.testing.assert_allclose(R, base @ pin.exp3(angles[k] * axis), atol=1e-3)
         np.testing.assert_allclose(omega, base @ axis * 2.4, atol=1e-2)
+
+
+def test_a_copy_of_a_pickle_has_the_messages_that_wait_for_it_alone() -> None:
+    inbox = Inbox(Space(1, False))
+    first, behind = Reader(inbox), Reader(inbox, aside=True)
+    inbox.put(value=[1.0])
+    assert len(first.take(0.0)) == 1
+    again = pickle.loads(pickle.dumps(behind))
+    for reader in (again.copy(), again):
+        assert len(reader.take(0.0)) == 1
+        assert len(reader.take(0.0)) == 0

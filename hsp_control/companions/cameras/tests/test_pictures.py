@@ -8,6 +8,7 @@ import sys
 from ctypes.util import find_library
 from io import BytesIO
 from pathlib import Path
+from types import SimpleNamespace
 from urllib.error import HTTPError
 from urllib.request import urlopen
 
@@ -21,7 +22,7 @@ from played import wait_until
 import hsp_control as hsp
 from hsp_control.cli.robot_process import RobotProcess
 from hsp_control.common.errors import HardwareError
-from hsp_control.companions.cameras import show
+from hsp_control.companions.cameras import pictures, show
 from hsp_control.live import run_loop
 
 pytest.importorskip("mujoco")
@@ -176,3 +177,30 @@ def test_mistakes_are_named(where: str, message: str) -> None:
     robot = hsp.Robot.load("planar3r")
     with pytest.raises(HardwareError, match=message):
         show(where, hsp.plants.RigidBodyPlant(robot))
+
+
+def test_a_process_that_ends_at_once_is_not_waited_for(
+    cell: hsp.Experiment, address: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The other end of its pipe is open nowhere else."""
+
+    class Ended:
+        exitcode = None
+
+        def __init__(self, **_: object) -> None:
+            pass
+
+        def start(self) -> None:
+            pass
+
+        kill = start
+
+    own = multiprocessing.get_context("spawn")
+    names = ("Lock", "Pipe", "RawArray", "RawValue")
+    context = SimpleNamespace(
+        Process=Ended, **{each: getattr(own, each) for each in names}
+    )
+    monkeypatch.setattr(pictures.multiprocessing, "get_context", lambda _: context)
+    monkeypatch.setattr(pictures, "_PATIENCE", 0.05)
+    with pytest.raises(HardwareError, match="drawn: its process has ended"):
+        show(address, cell.plant)

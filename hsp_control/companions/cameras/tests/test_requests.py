@@ -14,6 +14,8 @@ import pytest
 
 pytest.importorskip("mujoco")
 
+import mujoco
+
 from hsp_control.companions.cameras import pictures
 
 
@@ -64,3 +66,47 @@ def test_a_client_that_goes_away_is_forgotten(
         client.sendall(b"GET /above.jpg HTTP/1.0\r\n\r\n")
         assert client.recv(100).startswith(b"HTTP/1.0 200")
     assert "Traceback" not in capfd.readouterr().err
+
+
+def test_renderers_of_sizes_that_are_not_used_are_closed() -> None:
+    closed = list[int]()
+
+    class Renderer:
+        def __init__(self, model: object, height: int, width: int) -> None:
+            self.width = width
+
+        def update_scene(self, *_: object) -> None:
+            pass
+
+        def render(self) -> np.ndarray:
+            return np.zeros((1, self.width, 3))
+
+        def close(self) -> None:
+            closed.append(self.width)
+
+    drawing = object.__new__(pictures._Pictures)
+    nothing = dict.fromkeys(("mj_setState", "mj_forward"), lambda *_: None)
+    drawing._mujoco = SimpleNamespace(
+        Renderer=Renderer, mjtState=mujoco.mjtState, **nothing
+    )
+    drawing.model, drawing._data = None, SimpleNamespace(time=0.0)
+    drawing._state, drawing._lock = np.zeros(1), threading.Lock()
+    drawing._renderers = {}
+    for width in range(1, 7):
+        drawing.drawn(0, width, 1)
+    assert closed == [1, 2]
+
+
+def test_no_timer_outlives_its_request(
+    server: pictures._Drawer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Nor that of a client that sends nothing."""
+    monkeypatch.setattr(pictures, "_REQUEST", 600.0)
+    socket.create_connection(server.server_address[:2]).close()
+    with socket.create_connection(server.server_address[:2]) as client:
+        client.sendall(b"GET /above.jpg HTTP/1.0\r\n\r\n")
+        assert client.recv(100).startswith(b"HTTP/1.0 200")
+    for timer in threading.enumerate():
+        if isinstance(timer, threading.Timer) and "_hang_up" in repr(timer.function):
+            timer.join(10.0)  # one that is cancelled ends at once
+            assert not timer.is_alive()

@@ -193,3 +193,17 @@ def test_a_send_error_is_reported_once_and_has_no_other_effect(
     assert line.startswith(
         "udp://255.255.255.255:5006: the state cannot be sent there: "
     )
+
+
+def test_a_joint_without_limits_is_one_angle(states: socket.socket) -> None:
+    """Its configuration is a cosine and a sine."""
+    robot = hsp.Robot.load("planar3r")
+    task = hsp.FramePosition("tip", axes="xy")
+    source = CompensatedController(hsp.Controller(robot, [task]))
+    reported = publish(f"127.0.0.1:{states.getsockname()[1]}", source)
+    angles = np.array([0.3, -0.5, 0.9])
+    q = robot.integrate(robot.neutral(), angles)
+    source.effort(0.0, q, np.zeros(3), 0.001)
+    reported(0.0)
+    reported.ended("completed", "")
+    np.testing.assert_allclose(json.loads(states.recv(65536))["q"], angles)

@@ -8,6 +8,7 @@ from collections.abc import Callable
 from contextlib import closing, suppress
 from io import BytesIO
 from math import pi
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -313,3 +314,18 @@ def test_without_pylibfranka_the_extra_is_named(
     monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
     with pytest.raises(HardwareError, match=r"pip install 'hsp_control\[franka\]'"):
         ClientProcess()
+
+
+def test_the_hand_and_the_load_of_an_arm_are_named(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    found = {
+        "q": [0.0] * 7, "masses": [], "gravities": [],
+        "end_effector": 0.73, "load": {"mass": 0.25}, "total": {"mass": 0.98},
+    }  # fmt: skip
+    monkeypatch.setattr(connection, "reached", lambda *_, **__: (Answers(), found))
+    alike = SimpleNamespace(check=lambda mass: None, __str__=lambda: "alike")
+    monkeypatch.setattr(connection, "difference", lambda *_: alike)
+    hardware = connection.connect("a?realtime=ignore", Robot.load("panda"), 0.001)
+    first, *_ = hardware.lines
+    assert "end effector 0.73 kg (Desk), load 0.25 kg, " in first

@@ -135,3 +135,15 @@ def test_another_robot_is_no_franka() -> None:
     ):
         with pytest.raises(ModelError, match=reason):
             own_model(text, reported(), [0.0] * 16)
+
+
+def test_the_joint_of_the_largest_difference_is_named() -> None:
+    """At any posture, not only at the first."""
+    robot = Robot.load("panda")
+    q = postures(robot)
+    M, g = masses_and_gravities(robot.model, q)
+    g[0, 1] += 0.5
+    g[3, 2] -= 1.5
+    found = difference(robot, q, M, g)
+    assert found.gravity == pytest.approx(1.5)
+    assert found.joint == "panda_joint3"

@@ -39,9 +39,14 @@ def test_an_opening_is_read(message: Any, opening: float) -> None:
     ids=repr,
 )  # fmt: skip
 def test_nothing_else_moves_the_fingers(message: Any) -> None:
-    """Text was parsed by its first letter: "0.02" closed the gripper."""
+    """Nor keeps another sender's from it.
+
+    Text was parsed by its first letter: "0.02" closed the gripper.
+    """
+    made, other = gripper(), ("127.0.0.1", 6)
     with pytest.raises(ValueError, match="need"):
-        gripper().read(message, SENDER, 0.01)
+        made.read(message, SENDER, 0.01)
+    assert made.read({"value": [0.02]}, other, 0.01) == 0.02
 
 
 class Closed:

@@ -1,6 +1,7 @@
 """A finding names the implausible value, and a remedy that works."""
 
 import json
+import logging
 from collections.abc import Callable
 from pathlib import Path
 
@@ -240,3 +241,11 @@ def test_mistakes_of_the_command(
     assert "'mass=3': an argument of a xacro file is name:=value" in (
         capsys.readouterr().err
     )
+
+
+def test_after_an_inspection_warnings_are_printed_again() -> None:
+    logger = logging.getLogger("hsp_control")
+    before = logger.level
+    assert before < logging.ERROR
+    assert main(["inspect", "planar3r"]) == 0
+    assert logger.level == before

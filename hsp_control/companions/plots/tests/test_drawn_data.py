@@ -1,19 +1,24 @@
 """Figures show the log's numbers, and predictions of e_N."""
 
+from pathlib import Path
+
 import matplotlib as mpl
 import numpy as np
 import pinocchio as pin
 import pytest
 from drawn_logs import (
     GAINS,
+    PAPER,
     Arm,
     both,
     changed,
     drawn,
     legend_texts,
     lines,
+    planar,
 )
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 import hsp_control.companions.plots as plots
 from hsp_control import (
@@ -26,7 +31,8 @@ from hsp_control import (
     Rollout,
     simulate,
 )
-from hsp_control.companions.plots import log_series, palette, world
+from hsp_control.companions.plots import figures, log_series, palette, world
+from hsp_control.companions.plots.frames import draw_frame
 from hsp_control.companions.plots.log_series import decay_power, predicted_decay
 from hsp_control.companions.viewer.targets import read_targets
 from hsp_control.geometry import Scene, shapes
@@ -360,3 +366,49 @@ def test_the_power_of_a_matrix_gain_is_the_fall_of_V_in_the_metric() -> None:
     assert power is not None
     fall = -V * np.gradient(np.log(V), run.t)
     np.testing.assert_allclose(power[1:-1], fall[1:-1], rtol=0.01)
+
+
+@pytest.mark.parametrize(
+    ("status", "color"),
+    [("completed", palette.MUTED), ("interrupted", palette.WARNING)],
+)
+def test_the_foot_of_an_incomplete_run_is_a_warning(status: str, color: str) -> None:
+    log = changed(planar(PAPER["rest"]), slice(20), status=status, message="why")
+    figure = plots.diagnostics_figure(log, panels=["efforts"])
+    (foot,) = [
+        text for text in figure.texts if text.get_text() == figure.get_supxlabel()
+    ]
+    assert foot.get_color() == color
+
+
+def test_saved_frames_are_at_the_times_that_are_given(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    saved = dict[str, Figure]()
+
+    def save(figure: Figure, stem: Path, _: object) -> list[Path]:
+        saved[stem.name] = figure
+        return [stem]
+
+    monkeypatch.setattr(figures, "save_figure", save)
+    plots.save_figures(planar(PAPER["rest"]), tmp_path, "run", times=[0.2, 0.5])
+    titles = [axes.get_title("left") for axes in saved["run-paper"].findobj(Axes)]
+    times = [each.partition("t = ")[2] for each in titles if "t = " in each]
+    assert times == ["0.20 s", "0.50 s"]
+
+
+def test_a_frame_has_the_time_of_its_row() -> None:
+    log = planar(PAPER["rest"])
+    late = changed(log, columns={"t": log.t + 5.0})  # the clock need not start at 0
+    assert drawn(draw_frame, late, 20).get_title("left") == "t = 5.20 s"
+
+
+def test_an_obstacle_larger_than_the_robot_is_known_as_such() -> None:
+    task = FramePosition("panda_tcp", Hold())
+    scene = Scene([
+        Obstacle(name, shapes.Box([size, size, 0.1]), [0.0, 0.0, -1.0])
+        for name, size in (("table", 0.5), ("floor", 3.0))
+    ])  # fmt: skip
+    table, floor = world.logged_obstacles(Arm().run(task, scene=scene))
+    assert not table.oversized
+    assert floor.oversized

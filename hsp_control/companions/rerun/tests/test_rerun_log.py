@@ -3,6 +3,7 @@
 import builtins
 from collections.abc import Mapping
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import mujoco
@@ -18,8 +19,10 @@ from hsp_control.common.arrays import Array
 from hsp_control.common.errors import ExportError
 from hsp_control.companions.rerun.log import (
     _archetypes,
+    _layout,
     _log_paths,
     _log_robot,
+    _mesh,
     log_to_rerun,
 )
 from hsp_control.companions.viewer.commands import path_element
@@ -222,3 +225,48 @@ def test_rotations_are_the_same(log: hsp.Rollout) -> None:
     assert target.rotation is not None
     given = sent["/targets/hand"]["quaternion"]
     np.testing.assert_array_equal(given, target.rotation)
+
+
+def test_plots_beside_the_scene_are_of_the_columns_that_they_name(
+    log: hsp.Rollout,
+) -> None:
+    _, plots = _layout(log).root_container.contents
+    assert {each.name: each.contents for each in plots.contents} == {
+        "Task errors": ["+ /log/task.hand.error/**"],
+        "Null-space error ‖e_N‖": ["+ /log/null_space_norm/**"],
+        "Distances": ["+ /log/distance.obstacle_clearance/**"],
+        "Efforts": ["+ /log/tau/**"],
+    }
+
+
+def test_a_desired_path_has_the_colour_of_its_target(log: hsp.Rollout) -> None:
+    colors = dict[str, Any]()
+
+    class Recording:
+        def log(self, path: str, thing: Any, **_: Any) -> None:
+            colors[path] = thing.colors.as_arrow_array().to_pylist()
+
+        def send_columns(self, *_: Any) -> None:
+            pass
+
+    _log_paths(rerun, Recording(), RunMotion(Robot.load("panda"), log))
+    assert colors["/paths/hand/desired"] == colors["/targets/hand"]
+    assert colors["/paths/hand/actual"] != colors["/targets/hand"]
+
+
+def test_a_file_is_complete_though_its_recording_is_still_there(
+    log: hsp.Rollout, tmp_path: Path
+) -> None:
+    path = tmp_path / "run.rrd"
+    recording = log_to_rerun(log, path=path)
+    paths = {chunk.entity_path for chunk in RrdReader(path).stream()}
+    assert {f"/log/{name}" for name in ("null_space_norm", "status")} <= paths
+    del recording
+
+
+def test_normals_of_a_mesh_point_outwards() -> None:
+    corners = np.array([[0.0, 0.0, 0.0], *np.eye(3)])
+    faces = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
+    drawn = _mesh(SimpleNamespace(Mesh3D=dict), corners, faces, None)
+    outwards = corners - corners.mean(axis=0)
+    assert ((drawn["vertex_normals"] * outwards).sum(axis=1) > 0.0).all()

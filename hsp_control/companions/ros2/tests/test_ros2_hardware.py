@@ -338,3 +338,20 @@ def test_the_first_two_reads_are_a_period_apart(rig: tuple[Rig, Ros2Hardware]) -
         assert found is not None
         times.append(found.t)
     np.testing.assert_allclose(times, PERIOD * np.arange(4), atol=1e-9)
+
+
+def test_a_second_faulty_message_is_passed_over(rig: tuple[Rig, Ros2Hardware]) -> None:
+    """The safe stop needs the good states."""
+    made, hardware = rig
+    made.robot.send()
+    assert hardware.read(LONG) is not None
+    made.robot.send(v=[0.0] * 6)
+    bad = hardware.read(LONG)
+    assert bad is not None
+    assert bad.fault
+    made.robot.send(v=[0.0] * 6)
+    made.robot.send(v=[0.25] * 7)
+    found = hardware.read(LONG)
+    assert found is not None
+    assert not found.fault
+    assert found.v[0] == 0.25

@@ -162,3 +162,14 @@ def test_a_change_turns_about_the_axes_of_the_world(arm: ArmEnv) -> None:
     np.testing.assert_allclose(goal.rotation, pin.exp3(turn) @ here.rotation, atol=1e-9)
     moved = goal.translation - here.translation
     np.testing.assert_allclose(moved, [0.05, 0.0, -0.1], atol=1e-9)
+
+
+def test_forces_are_those_of_the_last_step(arm: ArmEnv) -> None:
+    """As after MujocoEnv's own simulation: observations may contain them."""
+    env = HandTargets(arm, "hand", FREE)
+    env.reset(seed=0)
+    env.step(env.action_space.low)
+    found = arm.data.cfrc_int.copy()
+    assert np.abs(found).max() > 0.0
+    mujoco.mj_rnePostConstraint(arm.model, arm.data)
+    np.testing.assert_array_equal(arm.data.cfrc_int, found)

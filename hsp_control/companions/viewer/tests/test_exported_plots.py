@@ -142,3 +142,30 @@ def test_the_command_exports_two_logs(planar: ComparedRun, tmp_path: Path) -> No
         titled.append(str(Rollout(rollout.columns, meta).save(Path(log))))
     assert main(["export", *titled, "--html", str(page)]) == 0
     assert "<title>Case 0 and Case 1</title>" in page.read_text(encoding="utf-8")
+
+
+def test_a_comparison_lasts_from_the_first_start_to_the_last_end(
+    planar: ComparedRun,
+) -> None:
+    log = planar.rollout
+    late = Rollout({**log.columns, "t": log.t + 2.0}, log.meta)
+    for runs in ((log, late), (late, log)):
+        plots = [ComparedRun(str(k), planar.robot, run) for k, run in enumerate(runs)]
+        packed = pack_panels(plots, ArrayTable())
+        assert (packed["start"], packed["end"]) == (0.0, 3.0)
+
+
+def test_bounds_of_all_compared_runs_are_drawn(planar: ComparedRun) -> None:
+    log = planar.rollout
+    disk = log.meta["obstacles"]["disk"] | {"radius": 0.3}
+    larger = Rollout(log.columns, log.meta | {"obstacles": {"disk": disk}})
+    plots = [planar._replace(name="a"), planar._replace(name="b", rollout=larger)]
+    panels = pack_panels(plots, ArrayTable())["panels"]
+    (edges,) = (each["edges"] for each in panels if each["title"] == "Minimum distance")
+    assert [each["value"] for each in edges] == [0.2, 0.3]
+
+
+def test_a_note_says_how_many_milliseconds_an_effort_is_held() -> None:
+    run = run_of("simulation.duration=0.1", "simulation.control_period=0.002")
+    _, null_space, *_ = panels_of(run.rollout)
+    assert null_space.note == "effort held for 2 ms"

@@ -1,14 +1,20 @@
 """A preview of self-motion: task errors are constant, and the elbow moves."""
 
+from collections.abc import Iterator
+from typing import Any
+
 import numpy as np
 import pytest
 
 from hsp_control import load_experiment
+from hsp_control.companions.viewer import self_motion_preview
 from hsp_control.companions.viewer.commands import unpack
 from hsp_control.companions.viewer.self_motion_preview import (
     PreviewDrawing,
+    SelfMotion,
     SelfMotionPreview,
 )
+from hsp_control.control.interface import Controller
 
 
 @pytest.mark.parametrize("name", ["panda_obstacle", "iiwa_null_space", "ur5_position"])
@@ -71,3 +77,47 @@ def test_a_preview_is_drawn_when_it_is_there_and_then_removed() -> None:
     assert [each["type"] for each in removed] == ["delete", "ghosts"]
     assert removed[-1]["count"] == 0
     assert list(drawing.draw(controller, on=False)) == []
+
+
+def drawn(drawing: PreviewDrawing, controller: Controller) -> Iterator[dict[str, Any]]:
+    for each in drawing.draw(controller, on=True):
+        yield unpack(each.packed)
+
+
+def test_after_a_new_beginning_the_controller_of_then_is_previewed(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    previewed = list[Controller]()
+
+    class Preview:
+        def __init__(self, controller: Controller) -> None:
+            previewed.append(controller)
+
+        def curve(self, *_: object) -> None:
+            pass
+
+    monkeypatch.setattr(self_motion_preview, "SelfMotionPreview", Preview)
+    experiments = [load_experiment("panda_obstacle") for _ in range(2)]
+    drawing = PreviewDrawing(experiments[0].robot)
+    for each in experiments:
+        each.controller.compute(0.0, each.q0, each.v0)
+        drawing.begin()
+        assert list(drawn(drawing, each.controller)) == []
+    assert previewed == [each.controller for each in experiments]
+
+
+def test_a_ball_is_where_the_cost_is_least(monkeypatch: pytest.MonkeyPatch) -> None:
+    experiment = load_experiment("panda_obstacle")
+    controller, q = experiment.controller, experiment.q0
+    controller.compute(0.0, q, experiment.v0)
+    elbow = np.array([[0.1, 0.2, 0.3], [0.4, 0.5, 0.6], [0.7, 0.8, 0.9]])
+    motion = SelfMotion(np.tile(q, (3, 1)), elbow, np.array([2.0, 1.0, 3.0]))
+    monkeypatch.setattr(SelfMotionPreview, "curve", lambda *_: motion)
+    drawing = PreviewDrawing(experiment.robot)
+    assert list(drawn(drawing, controller)) == []
+    assert drawing._coming is not None
+    drawing._coming.result()
+    (ball,) = (
+        each for each in drawn(drawing, controller) if each["type"] == "set_transform"
+    )
+    assert np.ravel(ball["matrix"])[12:15] == pytest.approx(elbow[1])

@@ -1,6 +1,7 @@
 """The view's server: reachable on this machine only, without residues at its end."""
 
 import asyncio
+import errno
 import gzip
 import hmac
 import socket
@@ -14,6 +15,7 @@ from collections.abc import Iterator
 from contextlib import closing
 from http.client import HTTPConnection
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -25,7 +27,13 @@ from tornado.websocket import websocket_connect
 
 from hsp_control import Robot, Rollout
 from hsp_control.common.errors import ExportError, ViewerError
-from hsp_control.companions.viewer import SceneRecorder, Viewer, offline_page, transport
+from hsp_control.companions.viewer import (
+    SceneRecorder,
+    Viewer,
+    offline_page,
+    page_server,
+    transport,
+)
 from hsp_control.companions.viewer.commands import (
     CAMERA,
     CAPTION,
@@ -35,6 +43,7 @@ from hsp_control.companions.viewer.commands import (
     key_of,
     page_command,
 )
+from hsp_control.companions.viewer.page_server import Hub
 from hsp_control.companions.viewer.transport import PageServer, page_key
 from hsp_control.geometry import Scene
 
@@ -275,6 +284,22 @@ def test_a_key_that_others_can_read_is_not_kept(
     assert file.read_text() == key == page_key("127.0.0.1")
     file.chmod(0o644)
     assert page_key("127.0.0.1") != key
+
+
+def test_a_key_that_cannot_be_written_leaves_no_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """So that the next start writes one which open pages find again."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+
+    def full(*_: object) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    with monkeypatch.context() as patched:
+        patched.setattr(transport.os, "link", full)
+        assert page_key("127.0.0.1") != page_key("127.0.0.1")
+    assert list((tmp_path / "hsp_control").iterdir()) == []
+    assert page_key("127.0.0.1") == page_key("127.0.0.1")
 
 
 def test_a_page_that_lost_its_program_keeps_its_key(
@@ -579,3 +604,17 @@ def test_an_unknown_host_is_named() -> None:
         ViewerError, match=r"cannot start: cannot listen on ö.*no computer"
     ):
         PageServer(host=70 * "ö")
+
+
+def test_nothing_waits_to_be_sent_to_a_page_that_has_left() -> None:
+    """Its commands come no more, and the task would wait for them until the end."""
+    cancelled = list[str]()
+    page = object.__new__(page_server.Page)
+    page.hub = Hub(SceneRecorder().scene, steerable=False)
+    page.hub.pages.add(page)
+    page._delivery = SimpleNamespace(  # type: ignore[assignment]
+        cancel=lambda: cancelled.append("delivery")
+    )
+    page.on_close()
+    assert cancelled == ["delivery"]
+    assert not page.hub.pages

@@ -215,3 +215,20 @@ def test_footsteps_are_taken_from_the_middle_between_the_feet():
 def test_footsteps_out_of_reach_are_reported(rows, message):
     with pytest.raises(HspControlError, match=wording(message)):
         load_experiment(WALK, GIVEN % rows)
+
+
+@pytest.mark.parametrize("name", ["walking/talos_walk", "walking/solo12_trot"])
+def test_in_a_new_run_a_robot_stands_on_all_its_feet(name):
+    experiment = load_experiment(name)
+    law, plan = experiment.controller, experiment.scenario.plan
+    state = law.robot.state(0.0, experiment.q0, experiment.v0)
+    feet = {each.name: each.schedule for each in law.contacts}
+    swings = [each.schedule for each in law.tasks if each.name in feet]
+    assert len(swings) == len(feet)
+    for _ in range(2):
+        plan.begin(law).start(state)
+        assert all(each.is_on for each in feet.values())
+        assert not any(each.is_on for each in swings)
+        for contact, task in zip(feet.values(), swings, strict=True):
+            contact.set(False, 1.0)
+            task.set(True, 1.0)
