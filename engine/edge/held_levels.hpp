@@ -13,10 +13,11 @@
 //
 //   ρ = max_c (A/K - n²),      A = x max_j ‖L⁻¹e_j‖
 //
-// with A the largest joint acceleration due to x. What persists of x is the command of the errors at
-// rest, J# f. The rest is due to a motion, as far as a barrier demands that of a speed, 2 α c v: a
-// limit that brakes a self-motion costs a task that is met nothing, without slack. Of a direction of the singular value s below its
-// threshold ε a level has the share 1 - λ (1 - s²/ε²)², with λ the slack of `limit_share.hpp`.
+// with A the largest joint acceleration due to x. What persists of x is the command of the errors
+// at rest, J# f. The rest is due to a motion, as far as a barrier demands that of a speed, 2 α c v,
+// and does not count without slack: a limit that brakes a self-motion costs a task that is met
+// nothing. Of a direction of the singular value s below its threshold ε a level has the share
+// 1 - λ (1 - s²/ε²)², with λ the slack of `limit_share.hpp`.
 #pragma once
 #include <hsp/linalg.hpp>
 #include <hsp/records.hpp>
@@ -32,8 +33,7 @@ struct HeldLevels {
       "levels beyond limits, which is bounded by that of a.";
   In<'n', 'n'> M, L;
   int form;
-  In<'n'> v;
-  In<'n'> a;               // the unconstrained acceleration
+  In<'n'> v, a;            // a: the unconstrained acceleration
   In<'n'> effort;          // M a + N, plus the compensators' part
   In<'n'> law;             // its part by the law
   In<'l', 'n'> by_levels;  // the part of the law due to the first k levels
@@ -87,7 +87,7 @@ struct HeldLevels {
   double cost(Index rows, double scale) {
     double most = 0.0;
     const double braked = 2.0 * permitted.bandwidth, inf = std::numeric_limits<double>::infinity();
-    // The limit in `row`, with the excess at rest; a motion along it accounts for the difference.
+    // The limit in `row`, with the excess at rest, and what it demands of a motion.
     const auto consider = [&](double excess, double persists, double motion) {
       const double moving = std::min(excess - std::max(persists, 0.0), motion);
       excess -= (1.0 - slack[0]) * std::max(moving, 0.0);

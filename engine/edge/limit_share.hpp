@@ -14,7 +14,8 @@
 //
 //   r_f = J# f relative to what limits permit, or a spring's pull relative to its largest
 //
-// the share is at most r_f, and the priorities are strict but for the slack r_f, or μ.
+// the share is at most r_f, and the priorities are strict but for the slack r_f, or μ. Where f is
+// not known, of a task with no largest error above all others, r_f is 1.
 #pragma once
 #include "excess.hpp"
 
@@ -34,6 +35,7 @@ struct LimitShare {
   Permitted permitted;
   Barred<In> barred;
   double large;  // E_t from which on the damped law applies fully
+  double least;  // of r_f
   Out<1> share;  // of the damped law in the rest, by limits
   Out<1> slack;  // from 0, strict priorities, to 1
   Scratch<'n'> change, effort_change;
@@ -46,7 +48,8 @@ struct LimitShare {
     effort_change.noalias() = M * change;
     const double tasks = excess(bounds, permitted, barred, a, change, effort + effort_change);
     effort_change.noalias() = M * at_rest;
-    const double r_f = std::max(relative(permitted, at_rest, effort_change), pulls.norm());
+    const double of_errors = relative(permitted, at_rest, effort_change);
+    const double r_f = std::max({least, of_errors, pulls.norm()});
     share[0] = std::min({tasks / large, all / large, r_f, 1.0});
     slack[0] = mu[0] + (1.0 - mu[0]) * std::min(r_f, 1.0);
   }

@@ -164,6 +164,8 @@ class ActiveStack:
                     stretched=stretched,
                 )
                 self._calls.append(call)
+            elif not spring:
+                self.law.problem.demands_known = False
         # names of each level's tasks; ``contacts`` for those at the top
         self.level_names = [
             *(["contacts"] if first else []),

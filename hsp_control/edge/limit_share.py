@@ -10,7 +10,8 @@ of `Limits` far from them.
 A fast self-motion makes E_t large, too, though the tasks are met, and they would be
 left to the field. So the share is at most r_f, the command of the errors alone relative
 to the permitted one, which persists where tasks cannot be met and vanishes where they
-are; and priorities are strict but for that. The engine has the equations.
+are; and priorities are strict but for that. It is 1 where it is not known, of a task
+with no largest error above all others. The engine has the equations.
 """
 
 from typing import NamedTuple, Self
@@ -110,6 +111,7 @@ def limit_share(
         permitted=permitted,
         barred=barred,
         large=LARGE,
+        least=0.0 if law.problem.demands_known else 1.0,
         share=shares.by_limits,
         slack=shares.slack,
     )

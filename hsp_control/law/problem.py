@@ -65,6 +65,7 @@ class Problem:
             other rows.
         stretched: Length of the part of the error to which a row belongs, over its
             largest length, shape (m,); 0 for rows without one.
+        demands_known: Whether ``demand`` or ``pulls`` is written for every task.
         springs: Whether a row belongs to a spring, shape (m,). The law itself treats
             all rows alike; while limits are active, a spring yields like a body.
     """
@@ -81,6 +82,7 @@ class Problem:
         self.pulls = np.zeros(rows)
         self.stretched = np.zeros(rows)
         self.springs = np.zeros(rows, dtype=np.bool_)
+        self.demands_known = True
 
     @property
     def rows(self) -> dict[str, Array | Flags | Indices]:

@@ -151,10 +151,11 @@ def test_an_excess_without_end_leaves_finite_numbers() -> None:
 class Law:
     """The relevant part of a resolved law."""
 
-    def __init__(self, pulls: Array, share: float) -> None:
+    def __init__(self, pulls: Array, share: float, *, known: bool = True) -> None:
         self.problem: Any = self
         self.edge: Any = self
         self.pulls, self.share = pulls, np.array([share])
+        self.demands_known = known
 
 
 def shares(asked: Asked, law: Any, own: Array, at_rest: Array) -> list[float]:
@@ -182,6 +183,17 @@ def test_the_share_is_the_plain_formula(seed: int, size: float, demand: float) -
     # some 50 operations round; a demand below 1e-6 has a ratio of 1e-6 at most
     found = shares(asked, law, own, at_rest)
     np.testing.assert_allclose(found, expected, rtol=1e-10, atol=1e-11)
+
+
+@given(seeds, st.floats(0.1, 1e4))
+def test_tasks_of_unknown_demand_yield_to_limits(seed: int, size: float) -> None:
+    """What their errors command is not known: as if it were all that is permitted."""
+    rng = np.random.default_rng(seed)
+    asked, own = drawn(seed, size, 10.0), size * rng.normal(size=NV)
+    law, nothing = Law(np.zeros(3), rng.uniform(), known=False), np.zeros(NV)
+    E_t = min(excess(asked, -own), excess(asked, nothing))
+    found = shares(asked, law, own, nothing)
+    np.testing.assert_allclose(found, [min(E_t / LARGE, 1.0), 1.0], rtol=1e-10)
 
 
 @given(seeds, st.floats(1.0, 1e6))
