@@ -71,7 +71,7 @@ def test_towards_a_joint_limit() -> None:
     assert error(ours)[first] < 5e-4
     assert ours["null_space_norm"][first] > 1.0
     assert 5e-3 < error(ours)[second] < 0.05
-    waiting = (ours.t > 4.6) & (ours.t < 5.0)
+    waiting = (ours.t > 4.75) & (ours.t < 5.0)
     assert np.abs(ours["v"][waiting]).max() < 0.1  # at rest beyond its reach
     assert error(ours)[home] < 1e-5  # and everything recovers on the way back
     assert ours["null_space_norm"][home] < 1e-3

@@ -39,14 +39,20 @@ class Blind(Rig):
     """A robot at rest whose masses differ, and which is not measured any more."""
 
     def __init__(
-        self, arm: str, share: float, *, silent: bool, period: float = 0.002
+        self,
+        arm: str,
+        share: float,
+        *,
+        silent: bool,
+        period: float = 0.002,
+        begin: float = KNOWN,
     ) -> None:
         known = load(arm)
         true = RigidBodyPlant(changed(known, [Inertias(share)]))
         plant = IntegratedPlant(true, SemiImplicitEuler(period))
         q, v = known.home(), np.zeros(known.nv)
         super().__init__(SimulatedRobot(plant, q, v, period, settings=PATIENT))
-        self.silent, self.fastest, self.good = silent, 0.0, round(KNOWN / period)
+        self.silent, self.fastest, self.good = silent, 0.0, round(begin / period)
         every = np.ones(known.nv, dtype=bool)
         both = every, self.good, np.random.default_rng(0), period
         self.jump = partial(Sensors(*both), lie=LIES["both: +1 and +0.1"])
@@ -89,10 +95,17 @@ def test_an_arm_of_other_masses_that_is_not_measured_stays_at_rest(
     assert robot.fastest < 0.3
 
 
-def test_the_effort_that_is_held_in_a_silence_does_not_drive_an_arm() -> None:
-    """Over W = M(q) this light wrist gained 0.46 rad/s within twenty periods."""
-    robot = Blind("xarm7", 1.2, silent=True, period=0.001)
+@pytest.mark.parametrize("begin", [1.0, 1.004, *further(1.006, 1.011, 1.02)])
+def test_the_effort_that_is_held_in_a_silence_does_not_drive_an_arm(
+    begin: float,
+) -> None:
+    """Over W = M(q) the effort of a wrist of 3e-4 kg m² changes by 0.02 N·m in a step.
+
+    Which one is held depends on the moment: for 10 ms it gives 0.03 to 0.54 rad/s, for
+    the twenty periods until the stop it would give twice that.
+    """
+    robot = Blind("xarm7", 1.2, silent=True, period=0.001, begin=begin)
     law = at_rest("xarm7", hsp.metrics.MassMatrixMetric())
     report = run_loop(law, robot, duration=2.0, settings=SETTINGS)
     assert "no new state" in report.reason
-    assert robot.fastest < 0.3
+    assert robot.fastest < 0.7
