@@ -4,7 +4,8 @@
 
 Of a Panda's position task with joint centering: the first step, which places the parts
 and binds the calls, and a later one. The engine's computation is one call. Then the
-classes whose objects hold a gain, Kp or K_N, after a step.
+classes whose objects hold a gain, Kp or K_N, after a step. ``--write`` writes the
+numbers, and every class on the way, into the page on the architecture.
 """
 
 import argparse
@@ -20,15 +21,18 @@ import numpy as np
 
 import hsp_control as hsp
 
+sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
+from shared.marked_sections import replace_section  # of the benchmarks
+
 HOUSE = str(Path(hsp.__file__).parent)
 PAGE = Path(__file__).parents[1] / "docs/development/architecture.md"
 LATER = 400  # the unit of times is looked at in the first 300 steps
 KP, GAIN = 101.234567, 7.654321  # numbers that nothing else has [1/s², 1/s]
 
 
-def traced(act: Callable[[], object]) -> tuple[set[tuple[str, str]], set[str]]:
-    """Return the functions, with their files, and the classes of an act."""
-    functions, classes = set[tuple[str, str]](), set[str]()
+def traced(act: Callable[[], object]) -> tuple[set[tuple[str, str]], list[type]]:
+    """Return the functions, with their files, and the classes of an act, in order."""
+    functions, classes = set[tuple[str, str]](), dict[type, None]()
 
     def look(frame: FrameType, event: str, _: Any) -> None:
         code = frame.f_code
@@ -38,14 +42,14 @@ def traced(act: Callable[[], object]) -> tuple[set[tuple[str, str]], set[str]]:
             return
         functions.add((code.co_filename.removeprefix(HOUSE), code.co_qualname))
         if "self" in frame.f_locals:
-            classes.add(type(frame.f_locals["self"]).__name__)
+            classes.setdefault(type(frame.f_locals["self"]))
 
     sys.setprofile(look)
     try:
         act()
     finally:
         sys.setprofile(None)
-    return functions, classes
+    return functions, list(classes)
 
 
 def holders(root: object, number: float) -> list[str]:
@@ -101,13 +105,14 @@ def main() -> None:
         robot, [hand], hsp.JointCentering(), null_space_gain=GAIN
     )
     q, v = robot.home(), np.zeros(robot.nv)
-    counts = list[int]()
+    counts, on_the_way = list[int](), list[type]()
     for k, name in ((0, "first step"), (LATER, "later step")):
         for earlier in range(1, k):
             controller.compute(0.001 * earlier, q, v)
         functions, classes = traced(lambda k=k: controller.compute(0.001 * k, q, v))
         files = {file for file, _ in functions}
         counts += [len(functions), len(classes), len(files)]
+        on_the_way = on_the_way or classes
         print(
             f"{name}: {len(functions)} functions, {len(classes)} classes, "
             f"{len(files)} files"
@@ -120,6 +125,17 @@ def main() -> None:
         print(f"{name} is held by {len(classes_of)} classes: {', '.join(classes_of)}")
     if options.write:
         PAGE.write_text(written(PAGE.read_text("utf-8"), counts, held), "utf-8")
+        replace_section(PAGE, Path(__file__).name, table(on_the_way))
+
+
+def table(classes: Sequence[type]) -> str:
+    """Return a table of classes: module, name, and the docstring's first line."""
+    lines = ["| module | class | what it is |", "|---|---|---|"]
+    for kind in classes:
+        module = kind.__module__.removeprefix("hsp_control.")
+        what = (kind.__doc__ or "").partition("\n")[0].replace("|", "\\|")
+        lines.append(f"| `{module}` | `{kind.__name__}` | {what} |")
+    return "\n".join(lines) + "\n"
 
 
 def written(page: str, counts: Sequence[int], held: Sequence[Sequence[str]]) -> str:

@@ -33,7 +33,7 @@ from hsp_control.control.change import (
     RemoveTask,
 )
 from hsp_control.control.change_model import ChangeGravity, ChangePayload, ChangeTool
-from hsp_control.control.fitting import checked_gain
+from hsp_control.control.fitting import check_limits, checked_gain
 from hsp_control.control.setup import Setup
 from hsp_control.declaration import within
 from hsp_control.declaration.nested import parts_within
@@ -138,6 +138,7 @@ class Changes:
 
     def limits(self, limits: Limits | None) -> Self:
         """Change the limits; see `ChangeLimits`."""
+        check_limits(limits)
         return self._do(ChangeLimits(limits, at=self._at, ramp=self._ramp))
 
     def contact(self, contact: str, *, active: bool) -> Self:

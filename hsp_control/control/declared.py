@@ -15,6 +15,7 @@ from hsp_control.control.evolution import PRESENT, Evolution
 from hsp_control.control.first_state import check_angles
 from hsp_control.control.fitting import (
     Base,
+    check_limits,
     check_parts,
     check_support,
     check_tasks,
@@ -84,10 +85,7 @@ class DeclaredController:
         self.contacts = tuple(contacts)
         check_kind("field is", self.field, NullSpaceField, ControllerError)
         self.metric: Metric = check_kind("metric is", metric, Metric, ControllerError)
-        if limits is not None:
-            if limits == "none":
-                raise ControllerError("limits is 'none'; in Python it is None")
-            check_kind("limits is", limits, Limits, ControllerError)
+        check_limits(limits)
         self.scene = scene if isinstance(scene, Scene) else Scene(scene)
         # that of the first step where it is None
         self.start: Array | None = None

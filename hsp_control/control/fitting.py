@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 from hsp_control.common.arrays import Array
 from hsp_control.common.errors import ContactError, ControllerError, GainError
 from hsp_control.constraints.contacts import Contact
+from hsp_control.constraints.limits import Limits
 from hsp_control.declaration import Part, within
 from hsp_control.declaration.language import check_kind, shortened
 from hsp_control.declaration.quantities import LARGEST
@@ -26,10 +27,12 @@ Base = Literal["flying", "driven"]
 def check_parts(what: str, parts: object, kind: type[Part]) -> None:
     """Check that an argument is several parts of a kind."""
     if isinstance(parts, kind | Mapping | str) or not isinstance(parts, Iterable):
-        raise ControllerError(
-            f"{what} is {shortened(repr(parts))}; needs several, such as "
-            f"[{kind.__name__.lower()}]"
-        )
+        needed = f"needs several, such as [{kind.__name__.lower()}]"
+        if isinstance(parts, Mapping) and getattr(kind, "yaml_key", None) == "name":
+            needed = (
+                f"in Python it is a list, with name={next(iter(parts), '')!r} there"
+            )
+        raise ControllerError(f"{what} is {shortened(repr(parts))}; {needed}")
     for part in parts:
         if isinstance(part, list | tuple):
             raise ControllerError(
@@ -37,6 +40,14 @@ def check_parts(what: str, parts: object, kind: type[Part]) -> None:
                 "task"
             )
         check_kind(f"{what} contains", part, kind, ControllerError)
+
+
+def check_limits(limits: Limits | None) -> None:
+    """Check limits that were given in Python, where None has YAML's meaning of none."""
+    if limits == "none":
+        raise ControllerError("limits is 'none'; in Python it is None")
+    if limits is not None:
+        check_kind("limits is", limits, Limits, ControllerError)
 
 
 def check_tasks(tasks: Sequence[Task], robot: Robot) -> None:

@@ -8,7 +8,7 @@ from hsp_control.declaration.schema import ValueTypes, entry, is_model, keys
 
 _STEPS = 3
 """The farthest places, in keys up and down."""
-_MOST = 3
+_MOST = 5
 """More places than these do not show which one was meant."""
 _ANY = "*"
 """Any name or number of a part, in a place."""

@@ -56,6 +56,7 @@ class LiveView:
         self._pieces = 0
         self._cost = 0.0  # s per drawn row
         self._next = self._next_plots = 0.0
+        self._plotted = False
         self._begin: float | None = None
         viewer.set_stage(self._run, experiment.scenario.title)
 
@@ -112,7 +113,8 @@ class LiveView:
             self._next_plots = float("inf")
             return
         self._viewer.show_plots(plots)
-        took = time.thread_time() - before
+        took = time.thread_time() - before if self._plotted else 0.0
+        self._plotted = True  # the first picture took imports with it
         self._next_plots = now + max(PLOTS_PERIOD, took / PLOTS_SHARE)
 
     def _commands(self, motion: RunMotion, rows: Rollout, rate: float) -> list[Any]:

@@ -93,6 +93,8 @@ MISTAKES: list[tuple[dict[str, Any], str, str]] = [
     ({"obstacles": {"a": {"shape": BOX, "center": HOLD}}}, "ConfigError",
      "obstacles: unknown ... belongs to 'scene'"),
     ({"duration": 3}, "ConfigError", "duration: unknown ... belongs to 'simulation'"),
+    ({"natural_frequency": 3}, "ConfigError",
+     "natural_frequency: unknown ... to 'tasks.*.gains', ... or to 'live.stop'"),
     ({"blend": 1}, "ConfigError", "blend: unknown ... belongs to 'tasks.*' or"),
     ({"null_space": {"weight": 2}}, "ConfigError",
      "null_space.weight: unknown ... belongs to 'null_space.fields.*' or"),

@@ -108,6 +108,11 @@ TOGETHER = {"null_space_gain": indefinite_gain(), "metric": ConstantMetric(W1)}
         ({"limits": {"effort": 1}}, ControllerError, "limits is ... a Limits(effort"),
         ({"contacts": ["sole"]}, ControllerError, "contacts contains 'sole', a str"),
         ({"tasks": track}, ControllerError, "... needs several ... [task]"),
+        (
+            {"tasks": lambda: {"hand": track()}},
+            ControllerError,
+            "tasks is ... a list, with name='hand'",
+        ),
         ({"limits": "none"}, ControllerError, "... in Python it is None"),
         ({"field": hsp.Rest}, ControllerError, "... Rest, a class ... an instance"),
         (

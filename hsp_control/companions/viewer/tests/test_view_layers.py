@@ -640,6 +640,37 @@ def test_a_view_that_ends_does_not_end_the_run(
     assert "the run continues without a view" in caplog.text
 
 
+def test_the_plots_come_every_second_whatever_the_first_ones_took(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The first picture needs imports; afterwards drawing takes a hundredth."""
+    now, cpu, drawn = 0.0, 0.0, list[float]()
+
+    def plots(*_: object) -> dict[str, Any]:
+        nonlocal cpu
+        cpu += 1 / 64 if drawn else 0.25
+        drawn.append(now)
+        return {}
+
+    def row(recorder: Any) -> None:
+        nonlocal now
+        now += 0.25
+        view.on_row(recorder)
+
+    clock = SimpleNamespace(perf_counter=lambda: now, thread_time=lambda: cpu)
+    monkeypatch.setattr(live, "time", clock)
+    monkeypatch.setattr(live, "plots_so_far", plots)
+    monkeypatch.setattr(Viewer, "has_plots", True)
+    experiment = load_experiment(PLANAR, "simulation.duration=0.3")
+    viewer = Viewer(experiment.robot, transport=Recorder())
+    monkeypatch.setattr(viewer, "show_plots", lambda _: None)
+    view = LiveView(viewer, experiment)
+    experiment.run(on_row=row)
+    first, second, third = drawn[:3]
+    assert second - first == 1.0
+    assert third - second == 1.75  # 100 / 64 s, and then the next row
+
+
 def test_the_axes_of_an_ellipsoid_are_a_rotation_that_does_not_jump() -> None:
     """Mirrored axes are no rotation; and the nearest order of the axes is kept."""
     rng, last = np.random.default_rng(0), np.eye(3)
