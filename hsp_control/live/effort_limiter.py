@@ -17,6 +17,10 @@ _SURE = 5
 """Consecutive periods without a measurement that a bad connection may have."""
 
 
+_LASTING = 0.01
+"""Time over which an effort that has to last is averaged [s]."""
+
+
 class EffortLimiter:
     """Converts an effort into the sent value, within effort and rate limits."""
 
@@ -43,6 +47,7 @@ class EffortLimiter:
         self.gravity: Array = np.zeros(robot.nv)
         kept = max(settings.missing, settings.watchdog) + _SURE
         self._recent = SentEfforts(self._largest, kept)
+        self._mean_of = int(np.clip(round(_LASTING / period), 1, kept))
         # Bounds on the effort that may be in force, now and before the last one.
         self._least: Array = np.zeros(robot.nv)
         self._most: Array = np.zeros(robot.nv)
@@ -115,6 +120,18 @@ class EffortLimiter:
         self._least, self._most = np.minimum(has, other), np.maximum(has, other)
         self.applied = has + borne
         return True
+
+    @property
+    def lasting(self) -> Array | None:
+        """The effort for a period without a measurement, shape (nv,): tau.
+
+        The mean of 10 ms, and in the periods after the first one None: it is held. The
+        last effort is that of a moment: the noise of one sample, which acts for one
+        period, would act until the next measurement.
+        """
+        if self._unanswered > 1:
+            return None
+        return self._recent.mean(self._mean_of) + self._added_by_robot
 
     def no_measurement(self) -> None:
         """Add a period without a measurement; a dead line received the sent efforts."""

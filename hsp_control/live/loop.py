@@ -360,10 +360,10 @@ class LiveRun:
         self.stop("fault", reason, error)
 
     def controller_effort(self) -> Array | None:
-        """Return the controller's effort; None without a measurement: hold the last."""
+        """Return the controller's effort, or a lasting one; None: hold the last."""
         measurement, t = self.reader.measurement, self.reader.state.t
         if measurement is None:
-            return None
+            return self.limiter.lasting
         try:
             # The effort of the motors is used, with the gravity that the robot adds.
             has = None if measurement.applied is None else self.limiter.applied.copy()

@@ -41,6 +41,12 @@ class SentEfforts:
         self._sent[self._count % len(self._sent)] = effort
         self._count += 1
 
+    def mean(self, periods: int) -> Array:
+        """Return the mean of those of the last periods, shape (nv,)."""
+        last = np.arange(self._count - periods, self._count) % len(self._sent)
+        mean: Array = self._sent[last].mean(axis=0)
+        return mean
+
     def bounds_of(self, effort: Array) -> tuple[Array, Array, Array]:
         """Return its least and greatest possible effort, and the tolerance of rounding.
 

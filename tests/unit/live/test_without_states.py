@@ -92,7 +92,7 @@ def test_predictions_before_a_late_state_are_discarded() -> None:
 
 
 def test_an_effort_is_held_for_ten_milliseconds_then_the_robot_brakes() -> None:
-    """Until states arrive again; then the law goes on."""
+    """The mean of ten; until states arrive again, and then the law goes on."""
     lost, held = 18, 10
     rig = Rig(watched(), dict.fromkeys(range(80, 80 + lost), missing))
     speeds = list[float]()
@@ -106,8 +106,11 @@ def test_an_effort_is_held_for_ten_milliseconds_then_the_robot_brakes() -> None:
     sent = np.array(rig.sent)
     changes = np.abs(np.diff(sent, axis=0)).max(axis=1)
     still = np.flatnonzero(changes[:150] == 0.0)
-    assert still.size == held
-    assert np.ptp(still) == held - 1
+    assert still.size == held - 1
+    assert np.ptp(still) == held - 2
+    first = int(still[0])
+    mean = sent[first - held : first].mean(axis=0)
+    np.testing.assert_allclose(sent[first], mean, rtol=1e-12)
     begin = int(still[-1]) + 2  # of braking
     end = begin + lost - held
     expected = np.exp(-StopSettings().damping * (lost - held) * PERIOD)

@@ -101,11 +101,11 @@ def test_the_effort_that_is_held_in_a_silence_does_not_drive_an_arm(
 ) -> None:
     """Over W = M(q) the effort of a wrist of 3e-4 kg m² changes by 0.02 N·m in a step.
 
-    Which one is held depends on the moment: for 10 ms it gives 0.03 to 0.54 rad/s, for
-    the twenty periods until the stop it would give twice that.
+    That of the last moment alone would give up to 0.54 rad/s in 10 ms. The mean of
+    10 ms gives 0.11 rad/s, whenever the silence begins.
     """
     robot = Blind("xarm7", 1.2, silent=True, period=0.001, begin=begin)
     law = at_rest("xarm7", hsp.metrics.MassMatrixMetric())
     report = run_loop(law, robot, duration=2.0, settings=SETTINGS)
     assert "no new state" in report.reason
-    assert robot.fastest < 0.7
+    assert robot.fastest < 0.3
