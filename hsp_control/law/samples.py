@@ -5,6 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hsp_control.common.arrays import Array
+from hsp_control.common.errors import ShapeError
 
 IDENTITY, CONSTANT, VARYING = 0, 1, 2
 """Form of a metric: W = I (no solves); W' = 0 (solves); any W (solves, terms in W')."""
@@ -82,3 +83,19 @@ class MetricSample(NamedTuple):
     def allocate(cls, nv: int) -> "MetricSample":
         """Return the identity metric of nv degrees of freedom, with W' = 0."""
         return cls(np.eye(nv), np.eye(nv), np.zeros((nv, nv)))
+
+
+def check_sample(
+    name: str, given: object, kind: type[FieldSample] | type[MetricSample], nv: int
+) -> None:
+    """Raise unless an argument is a sample of nv degrees of freedom.
+
+    Raises:
+        ShapeError: If it is of another kind or size.
+    """
+    what = type(given).__name__
+    if isinstance(given, kind):
+        if len(given[0]) == nv:
+            return
+        what = f"a {what} of {len(given[0])}"
+    raise ShapeError(f"{name} is {what}; needs {kind.__name__}.allocate({nv})")

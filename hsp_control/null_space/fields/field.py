@@ -18,6 +18,7 @@ from hsp_control.declaration.quantities import NonNegative, OrInstance
 from hsp_control.engine.plans import AnyCall, PartCall, PartCalls, implemented_by
 from hsp_control.geometry.scene import Start
 from hsp_control.law import FieldSample, MetricSample
+from hsp_control.law.samples import check_sample
 from hsp_control.null_space.fields.weight import (
     Ramp,
     Weight,
@@ -133,6 +134,8 @@ class NullSpaceField(Part, ABC, family="fields", error=FieldError):
             form: The metric's form, see `Metric`.
             out: The sample to write into, shapes (nv,).
         """
+        check_sample("metric", metric, MetricSample, state.robot.nv)
+        check_sample("out", out, FieldSample, state.robot.nv)
 
         def make() -> tuple[tuple[MetricSample, FieldSample], PartCalls]:
             known = MetricSample.allocate(state.robot.nv)

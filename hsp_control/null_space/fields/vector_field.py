@@ -11,6 +11,7 @@ from hsp_control.common.arrays import Array
 from hsp_control.common.errors import FieldError
 from hsp_control.declaration.imported import AS_TEXT, NAMED
 from hsp_control.law import FieldSample, MetricSample
+from hsp_control.law.samples import check_sample
 from hsp_control.null_space.fields.field import NullSpaceField
 from hsp_control.robot import RobotState
 from hsp_control.robot.differences import rate_along_flow
@@ -40,6 +41,7 @@ class VectorField(NullSpaceField):
         Raises:
             FieldError: If either is not an array of nv finite numbers.
         """
+        check_sample("out", out, FieldSample, state.robot.nv)
         out.g[:] = self._tangent(self.vector(state), "g", state)
         out.g_dot[:] = self._tangent(self.rate(state), "g'", state)
         return out
@@ -97,6 +99,7 @@ class Rest(NullSpaceField, type="rest"):
         self, state: RobotState, metric: MetricSample, form: int, out: FieldSample
     ) -> FieldSample:
         """Write g = 0 and g' = 0; see `NullSpaceField.evaluate`."""
+        check_sample("out", out, FieldSample, state.robot.nv)
         out.g[:] = 0.0
         out.g_dot[:] = 0.0
         return out

@@ -24,6 +24,7 @@ from hsp_control.declaration.quantities import (
 from hsp_control.engine.plans import PartCall, PartCalls, implemented_by
 from hsp_control.geometry.scene import Start
 from hsp_control.law import CONSTANT, IDENTITY, VARYING, MetricSample
+from hsp_control.law.samples import check_sample
 from hsp_control.robot import RobotState
 
 
@@ -84,6 +85,7 @@ class Metric(Part, ABC, family="metrics", error=MetricError):
             state: The robot's state: t, q, v and the kinematics.
             out: The sample to write into, shapes (nv, nv).
         """
+        check_sample("out", out, MetricSample, state.robot.nv)
         state.run([self.call(state).given(out=out)])
         return out
 
@@ -177,6 +179,7 @@ class FixedMetric(Metric):
 
     def evaluate(self, state: RobotState, out: MetricSample) -> MetricSample:
         """Write W and L; W' stays zero. See `Metric.evaluate`."""
+        check_sample("out", out, MetricSample, state.robot.nv)
         out.W[:] = self.W
         out.L[:] = self._factor
         return out
@@ -189,6 +192,7 @@ class IdentityMetric(Metric, type="identity"):
 
     def evaluate(self, state: RobotState, out: MetricSample) -> MetricSample:
         """Return ``out`` unchanged: `MetricSample.allocate` returns the identity."""
+        check_sample("out", out, MetricSample, state.robot.nv)
         return out
 
 

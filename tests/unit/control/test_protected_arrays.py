@@ -486,6 +486,31 @@ def test_a_sample_of_another_size_is_one_error() -> None:
             task.evaluate(own.state, wrong)  # type: ignore[arg-type]
 
 
+@pytest.mark.parametrize(
+    "metric",
+    [
+        hsp.metrics.IdentityMetric(),
+        hsp.metrics.ConstantMetric(np.ones(NV)),
+        hsp.metrics.MassMatrixMetric(),
+    ],
+)
+def test_the_output_of_another_kind_is_named(metric: Metric) -> None:
+    """Of metrics, and of fields; the identity would accept anything."""
+    robot, fits = hsp.Robot.load("panda"), r"allocate\(7\)"
+    state = robot.state(0.0, robot.home(), np.zeros(NV))
+    fields = hsp.JointCentering(), hsp.Rest(), hsp.JointCentering() + hsp.Rest()
+    known, out = MetricSample.allocate(NV), FieldSample.allocate(NV)
+    wrong: Any
+    for wrong in (None, "out", np.eye(NV), FieldSample.allocate(NV + 1)):
+        with pytest.raises(ShapeError, match=f"out is .*needs MetricSample.{fits}"):
+            metric.evaluate(state, wrong)
+        for field in fields:
+            with pytest.raises(ShapeError, match=f"out is .*needs FieldSample.{fits}"):
+                field.evaluate(state, known, metric.form, wrong)
+    with pytest.raises(ShapeError, match="metric is ndarray"):
+        fields[0].evaluate(state, np.eye(NV), metric.form, out)  # type: ignore[arg-type]
+
+
 # -- a fork beside a thread ------------------------------------------------------------
 
 
