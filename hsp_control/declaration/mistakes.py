@@ -306,6 +306,8 @@ def _meant(value: Any, expected: ValueTypes) -> str:
     """Return the mapping that the user meant by a type's name, or by a bare value."""
     choices = literals(expected.options)
     if (tag := expected.discriminator) is None:
+        if isinstance(value, str) and not choices and "name" in keys(expected):
+            return f"; did you mean {{name: {value}}}?"
         return _near(value, choices)
     types = tagged(expected.options, tag)
     if isinstance(value, str):

@@ -43,6 +43,8 @@ from hsp_control.common.unicode_text import json_text
 MAGIC = b"hsp_control journal 1\n"
 KILLED = "the journal has no end: its writer was killed"
 
+MOST_AXES = 16
+"""Maximum number of axes of a column; NumPy's arrays have at most 32 or 64."""
 LARGEST_ROW = 100_000_000
 """Most bytes of a row; a heading that declares more is none."""
 
@@ -211,6 +213,8 @@ class JournalReader:
             shapes = {n: tuple(s) for n, s in heading["columns"].items()}
             sizes = [size for shape in shapes.values() for size in shape]
             if not all(type(size) is int and size >= 0 for size in sizes):
+                raise ValueError
+            if max(map(len, shapes.values()), default=0) > MOST_AXES:
                 raise ValueError
             if 8 * width(shapes) > LARGEST_ROW:
                 raise LogError(

@@ -205,11 +205,13 @@ class Rollout:
         if path.suffix in (".yaml", ".yml"):
             made = spoken(f"hsp run {path} writes", "load_experiment(...).run() makes")
             raise LogError(f"{path}: a configuration, not a log; {made} one")
+        kind, read = ".npz log", _read_npz
         try:
             if why := why_endless(path):
                 raise LogError(f"{path}: {why}; no log")
-            reading = _read_journal if is_journal(path) else _read_npz
-            columns, meta = reading(path)
+            if is_journal(path):
+                kind, read = "journal", _read_journal
+            columns, meta = read(path)
             if meta.get("format") == FORMAT:
                 check_kinds(meta)
                 check_columns(columns, meta)
@@ -226,8 +228,7 @@ class Rollout:
         except _UNREADABLE as error:
             reason = str(error).splitlines()[0] if str(error) else type(error).__name__
             raise LogError(
-                f"{path}: not a complete .npz log (truncated, or another file): "
-                f"{reason}"
+                f"{path}: not a complete {kind} (truncated, or another file): {reason}"
             ) from error
         if meta.get("format") != FORMAT:
             raise LogError(

@@ -92,6 +92,7 @@ MISTAKES: list[tuple[dict[str, Any], str, str]] = [
     # where they belong
     ({"obstacles": {"a": {"shape": BOX, "center": HOLD}}}, "ConfigError",
      "obstacles: unknown ... belongs to 'scene'"),
+    ({"robot": "panda"}, "ConfigError", "robot: ... did you mean {name: panda}?"),
     ({"duration": 3}, "ConfigError", "duration: unknown ... belongs to 'simulation'"),
     ({"natural_frequency": 3}, "ConfigError",
      "natural_frequency: unknown ... to 'tasks.*.gains', ... or to 'live.stop'"),

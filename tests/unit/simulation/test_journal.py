@@ -251,6 +251,10 @@ HEADINGS: dict[str, tuple[bytes, str]] = {
         b'{"meta": {}, "columns": {"a": [7000000000000]}}',
         "a row would have",
     ),
+    "of 80 axes": (
+        b'{"meta": {}, "columns": {"a": [' + b"1, " * 79 + b"1]}}",
+        "a heading of the journal is invalid",
+    ),
     "negative": (b'{"meta": {}, "columns": {"a": [-1]}}', "a heading of the journal"),
     "no sizes": (b'{"meta": {}, "columns": {"a": ["x"]}}', "a heading of the journal"),
 }
