@@ -7,6 +7,7 @@ many. After an interruption the folder can be read, and continued.
 
 import fcntl
 import json
+import logging
 import os
 from collections.abc import Sequence
 from contextlib import suppress
@@ -31,6 +32,7 @@ SECONDS = 5.0
 MOST = 100_000
 """Number of rows in a file of a completed sweep."""
 
+_log = logging.getLogger(__name__)
 _KEY = b"hsp_control"  # of the metadata
 _NAME = "rows-{:06d}.parquet"
 
@@ -89,14 +91,7 @@ class RowFiles:
                     f"{folder}: a file, and sweeps are folders of files now; "
                     "give another --out"
                 )
-            folder.mkdir(parents=True, exist_ok=True)
-            self._lock = os.open(folder / ".lock", os.O_RDWR | os.O_CREAT, 0o644)
-            try:
-                fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except BlockingIOError:
-                os.close(self._lock)
-                self._lock = -1
-                raise SweepError(f"{folder}: another sweep writes it already") from None
+            self._take(folder)
             # Left by a process that was killed while it wrote; no other writes here
             # now.
             self._remove([*folder.glob(".*.part")])
@@ -117,6 +112,33 @@ class RowFiles:
             self._unlock()
             raise
 
+    def _take(self, folder: Path) -> None:
+        """Make a folder, unless it exists, and lock it."""
+        folder.mkdir(parents=True, exist_ok=True)
+        self._lock = os.open(folder / ".lock", os.O_RDWR | os.O_CREAT, 0o644)
+        try:
+            fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            os.close(self._lock)
+            self._lock = -1
+            raise SweepError(f"{folder}: another sweep writes it already") from None
+
+    def _restore(self, folder: Path) -> None:
+        """Write all rows again if the folder was deleted meanwhile."""
+        if folder.is_dir():
+            return
+        os.close(self._lock)
+        self._lock = -1
+        try:
+            self._take(folder)
+        except OSError as error:
+            raise SweepError(
+                f"{folder}: deleted, and cannot be written again: {error.strerror}"
+            ) from error
+        _log.warning("%s was deleted meanwhile; it is written again", folder)
+        if len(self.table):
+            self._put(self.table)
+
     def _compare(self, path: Path, identity: dict[str, Any]) -> None:
         for name, own in self._meta["identity"].items():
             other = identity.get(name)
@@ -136,6 +158,8 @@ class RowFiles:
 
     def write(self) -> None:
         """Write the rows that are only in memory."""
+        if self._folder is not None:
+            self._restore(self._folder)
         if self._new:
             # In the order of runs, whatever the order in which they ended.
             table = self._as_table(sorted(self._new, key=lambda row: row.run))

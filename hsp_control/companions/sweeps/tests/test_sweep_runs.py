@@ -2,6 +2,7 @@
 
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -296,6 +297,7 @@ def test_a_killed_worker_is_replaced(after: tuple[int, int], whole: Sweep) -> No
 
 DEADLY = """
 import os
+import shutil
 import hsp_control as hsp
 
 class Deadly(hsp.Cost, type="deadly"):
@@ -557,6 +559,29 @@ def test_one_process_at_a_time(file: Path, swept: Sweep, tmp_path: Path) -> None
         hsp.sweeps.sweep(MOVING, OVER, overrides=QUICK, out=out)
     held.close()
     assert not out.exists()  # it had no rows
+
+
+@pytest.mark.parametrize("later", [[1], []], ids=["more rows", "no more rows"])
+def test_a_folder_that_is_deleted_meanwhile_is_written_again(
+    later: list[int], tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    plan: Any = type("Plan", (), {"__len__": lambda _: 2})()
+    plan.base, plan.factors, plan.points, plan.name = plan, (), (), ""
+    out = tmp_path / "out" / "sweep.parquet"
+    files = RowFiles(plan, {}, out, fresh=False)
+    files.add(Row(0, "completed", "", {}, 0.1))
+    files.write()
+    shutil.rmtree(tmp_path / "out")
+    for run in later:
+        files.add(Row(run, "completed", "", {}, 0.1))
+    files.write()
+    with pytest.raises(SweepError, match="another sweep writes it already"):
+        RowFiles(plan, {}, out, fresh=False)
+    files.close()
+    rows, _ = read_rows(out)
+    assert rows["run"].to_pylist() == [0, *later]
+    assert "was deleted meanwhile" in caplog.text
+    assert [each.suffix for each in out.iterdir()] == [".parquet"]
 
 
 @pytest.mark.parametrize("content", [b"nonsense", b"PAR1", b""])
