@@ -31,11 +31,11 @@ struct HeldLevels {
   static constexpr const char* doc =
       "Write the minimum cost below each level, relative to it, for the demand of the first "
       "levels beyond limits, which is bounded by that of a.";
-  In<'n', 'n'> M, L;
+  Wanted<In> wanted;
+  In<'n', 'n'> L;
   int form;
-  In<'n'> v, a;            // a: the unconstrained acceleration
-  In<'n'> effort;          // M a + N, plus the compensators' part
-  In<'n'> law;             // its part by the law
+  In<'n'> v;
+  In<'n'> law;             // the law's part of a
   In<'l', 'n'> by_levels;  // the part of the law due to the first k levels
   In<'l', 'n'> at_rest;    // J# f of them
   Factors<In> factors;     // Q = X J L⁻ᵀ, orthonormal rows, X lower triangular
@@ -43,20 +43,16 @@ struct HeldLevels {
   In<'l'> thresholds;      // ε of each level
   In<'m'> units;           // D, in which singular values are, see `Thresholds`
   In<1> slack;             // λ
-  BoundsOfMotion bounds;
-  Permitted permitted;
-  Barred<In> barred;
+  StepLimits<In> limits;
   double stiffest;  // K: maximum change of δ with its direction [1/s²]
   Out<'l'> held;
   Scratch<'n'> change, effort_change, row;
   Scratch<'n'> rest, effort_at_rest;
   Scratch<'m'> share;
 
-  void check() const {
-    check_ends("ends", ends, factors.Q.rows());
-    check_at_least("the columns of barred.A", barred.A.cols(), a.size());
-  }
+  void check() const { check_ends("ends", ends, factors.Q.rows()); }
   void operator()() {
+    const auto& [M, a, effort] = wanted;
     write_shares();
     double longest = 0.0;
     for (Index i = 0; i < a.size(); ++i) longest = std::max(longest, length_of_joint(i));
@@ -85,6 +81,8 @@ struct HeldLevels {
 
   // The largest of A/K - n² of all limits, 0 if there is none; `rows` belong to the levels.
   double cost(Index rows, double scale) {
+    const auto& [M, a, effort] = wanted;
+    const auto& permitted = limits.permitted;
     double most = 0.0;
     const double braked = 2.0 * permitted.bandwidth, inf = std::numeric_limits<double>::infinity();
     // The limit in `row`, with the excess at rest, and what it demands of a motion.
@@ -101,8 +99,8 @@ struct HeldLevels {
     };
     for (Index i = 0; i < a.size(); ++i) {
       const double x = a[i], dx = change[i];
-      const double above = std::min(x, x + dx) - bounds.upper[i];
-      const double below = bounds.lower[i] - std::max(x, x + dx);
+      const double above = std::min(x, x + dx) - limits.upper[i];
+      const double below = limits.lower[i] - std::max(x, x + dx);
       if (above > 0.0 || below > 0.0) {
         length_of_joint(i);
         consider(std::max(above, below), above > 0.0 ? rest[i] : -rest[i], braked * std::abs(v[i]));
@@ -115,9 +113,9 @@ struct HeldLevels {
         consider(std::max(push, pull), std::abs(effort_at_rest[i]) - permitted.effort[i], inf);
       }
     }
-    for (Index r = 0; r < barred.lower.size(); ++r) {
-      const auto own = barred.A.row(r).head(a.size()).transpose();
-      const double missing = barred.lower[r] - std::max(own.dot(change), 0.0);
+    for (Index r = 0; r < limits.least.size(); ++r) {
+      const auto own = limits.row(r);
+      const double missing = limits.least[r] - std::max(own.dot(change), 0.0);
       if (missing > 0.0) {
         whiten_row(own);
         consider(missing, -own.dot(rest), braked * std::abs(own.dot(v)));

@@ -24,31 +24,27 @@ namespace hsp {
 struct LimitShare {
   static constexpr const char* doc =
       "Write the share of the damped law where limits bind, and the slack of priorities.";
-  In<'n', 'n'> M;
-  In<'n'> a;            // the law's acceleration, plus the compensators' part
-  In<'n'> effort;       // M a + N, plus the compensators' part
+  Wanted<In> wanted;
   In<'n'> self_motion;  // φ_N
   In<'n'> at_rest;      // J# f
   In<'m'> pulls;        // of springs, relative to their largest
   In<1> mu;             // share of the damped law, without that of limits
-  BoundsOfMotion bounds;
-  Permitted permitted;
-  Barred<In> barred;
+  StepLimits<In> limits;
   double large;  // E_t from which on the damped law applies fully
   double least;  // of r_f
   Out<1> share;  // of the damped law in the rest, by limits
   Out<1> slack;  // from 0, strict priorities, to 1
   Scratch<'n'> change, effort_change;
 
-  void check() const { check_at_least("the columns of barred.A", barred.A.cols(), a.size()); }
   void operator()() {
+    const auto& [M, a, effort] = wanted;
     change.setZero();
-    const double all = excess(bounds, permitted, barred, a, change, effort);
+    const double all = limits.excess(a, change, effort);
     change = -self_motion;
     effort_change.noalias() = M * change;
-    const double tasks = excess(bounds, permitted, barred, a, change, effort + effort_change);
+    const double tasks = limits.excess(a, change, effort + effort_change);
     effort_change.noalias() = M * at_rest;
-    const double of_errors = relative(permitted, at_rest, effort_change);
+    const double of_errors = limits.permitted.ratio(at_rest, effort_change);
     const double r_f = std::max({least, of_errors, pulls.norm()});
     share[0] = std::min({tasks / large, all / large, r_f, 1.0});
     slack[0] = mu[0] + (1.0 - mu[0]) * std::min(r_f, 1.0);

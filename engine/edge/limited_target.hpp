@@ -24,41 +24,35 @@ namespace hsp {
 struct LimitedTarget {
   static constexpr const char* doc =
       "Overwrite the unconstrained acceleration by the target of the step.";
-  In<'n', 'n'> M;
-  InOut<'n'> a;       // the law's acceleration, plus the compensators' part
-  InOut<'n'> effort;  // M a + N, plus the compensators' part
+  Wanted<InOut> wanted;
   struct {
     In<'n'> law, damped;
     In<'n'> law_self_motion, damped_self_motion;  // φ_N
     In<'n'> law_braking, damped_braking;          // P K_N P v
   } parts;
-  BoundsOfMotion bounds;
-  Permitted permitted;
-  Barred<InOut> barred;
+  StepLimits<InOut> limits;
   In<1> share;  // of the damped law, by limits
   Scratch<'n'> change, demand;
   Scratch<'n'> effort_change, effort_demand;  // M times them
 
-  void check() const {
-    check_at_least("a", a.size(), 1);
-    check_at_least("the columns of barred.A", barred.A.cols(), a.size());
-  }
+  void check() const { check_at_least("a", wanted.acceleration.size(), 1); }
   void operator()() {
+    auto& [M, a, effort] = wanted;
     const double damped = share[0];
     change = damped * (parts.damped - parts.law);
     effort_change.noalias() = M * change;
     demand = (1.0 - damped) * (parts.law_self_motion + parts.law_braking);
     demand += damped * (parts.damped_self_motion + parts.damped_braking);
     effort_demand.noalias() = M * demand;
-    const double E = excess(bounds, permitted, barred, a, change, effort + effort_change);
-    const double r = std::max(1.0, relative(permitted, demand, effort_demand));
+    const double E = limits.excess(a, change, effort + effort_change);
+    const double r = std::max(1.0, limits.permitted.ratio(demand, effort_demand));
     const double lost = 1.0 - 1.0 / std::min(1.0 + E, r);
     change -= lost * demand;
     effort_change -= lost * effort_demand;
 
     a += change;
     effort += effort_change;
-    barred.lower.noalias() -= barred.A.leftCols(a.size()) * change;
+    limits.least.noalias() -= limits.rows.leftCols(a.size()) * change;
   }
 };
 

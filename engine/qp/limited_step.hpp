@@ -11,16 +11,11 @@
 #pragma once
 #include <cmath>
 
+#include "../edge/excess.hpp"
 #include "../limits/records.hpp"
 #include "dual_active_set.hpp"
 
 namespace hsp {
-
-// The law's command; the effort is M a + N and friction, without contact forces.
-struct Wanted {
-  In<'n', 'n'> mass_matrix;
-  In<'n'> acceleration, effort;
-};
 
 // The possible contact forces; none if they are empty.
 struct Forces {
@@ -42,7 +37,7 @@ struct Places {
 };
 
 // Throws unless x is one deviation and the forces.
-inline void check_step(Index x, const Wanted& wanted, const Forces& forces) {
+inline void check_step(Index x, const Wanted<In>& wanted, const Forces& forces) {
   if (x != wanted.effort.size() + forces.first.size())
     throw std::invalid_argument("x must be n deviations and the forces");
 }
@@ -74,7 +69,7 @@ struct BeginLimitedStep {
 
 struct LimitedRows {
   static constexpr const char* doc = "The rows of base and efforts, and the bounds of x.";
-  Wanted wanted;
+  Wanted<In> wanted;
   Forces forces;
   Bounds<In> bounds;
   Places places;
@@ -127,7 +122,7 @@ struct SolveLimitedStep {
 struct LimitedResult {
   static constexpr const char* doc =
       "Effort, acceleration and forces of x, without the solver's violations.";
-  Wanted wanted;
+  Wanted<In> wanted;
   Forces forces;
   Bounds<In> bounds;
   Places places;

@@ -13,7 +13,7 @@ import numpy as np
 from hsp_control import engine
 from hsp_control.common.arrays import Array
 from hsp_control.edge.bound_law import BoundLaw
-from hsp_control.edge.limit_share import Barred, Permitted, Within
+from hsp_control.edge.excess import StepLimits, Wanted
 from hsp_control.edge.step import ByLevels
 from hsp_control.engine.plans import PartCall
 
@@ -24,30 +24,22 @@ and periods of up to 10 ms: K is half of it."""
 
 
 def held_levels(
-    M: Array,
-    a: Array,
-    effort: Array,
+    wanted: Wanted,
     v: Array,
     law: BoundLaw,
     parts: ByLevels,
     slack: Array,
-    bounds: Within,
-    permitted: Permitted,
-    barred: Barred,
+    limits: StepLimits,
 ) -> tuple[PartCall, Array]:
     """Return the call that writes the minimum costs below each level.
 
     Args:
-        M: Mass matrix, shape (nv, nv).
-        a: The law's acceleration, and that of compensators, shape (nv,).
-        effort: M a + N, and the compensators' effort, shape (nv,).
+        wanted: The law's command.
         v: Velocity, shape (nv,).
         law: The law.
         parts: Contributions of the first levels to it.
         slack: Of the priorities, shape (1,); see `limit_share`.
-        bounds: Bounds on the acceleration.
-        permitted: The bounds far from all limits, and the barriers' bandwidth.
-        barred: Rows of barriers, for deviations from a.
+        limits: The limits of the step.
 
     Returns:
         The call, and its result, shape (levels,): ρ for the first levels' command
@@ -56,21 +48,17 @@ def held_levels(
     held, metric = np.zeros(len(law.ends)), law.problem.metric
     call = PartCall(
         engine.HeldLevels,
-        M=M,
+        wanted=wanted,
         L=metric.L,
         form=law.form,
         v=v,
-        a=a,
-        effort=effort,
         law=law.acceleration,
         **parts._asdict(),
         ends=law.ends,
         thresholds=law.thresholds,
         units=law.units,
         slack=slack,
-        bounds=bounds,
-        permitted=permitted,
-        barred=barred,
+        limits=limits,
         stiffest=STIFFEST,
         held=held,
     )

@@ -14,56 +14,19 @@ are; and priorities are strict but for that. It is 1 where it is not known, of a
 with no largest error above all others. The engine has the equations.
 """
 
-from typing import NamedTuple, Self
+from typing import NamedTuple
 
 import numpy as np
 
 from hsp_control import engine
 from hsp_control.common.arrays import Array
 from hsp_control.edge.bound_law import BoundLaw
+from hsp_control.edge.excess import StepLimits, Wanted
 from hsp_control.engine.plans import PartCall
 
 LARGE = 2.0
 """Excess of the tasks above which the damped law applies fully: commands of three times
 the permitted value."""
-
-
-class Permitted(NamedTuple):
-    """The bounds far from all limits, shapes (nv,); inf without one."""
-
-    effort: Array  # [N·m or N]
-    acceleration: Array  # [rad/s² or m/s²]
-    bandwidth: float  # α of the barriers [1/s]
-
-    @classmethod
-    def by(
-        cls, effort: Array, span: Array, speed: Array, most: Array, bandwidth: float
-    ) -> Self:
-        """Return the bounds far from all limits of a robot.
-
-        Args:
-            effort: Maximum efforts, shape (nv,) as all of these.
-            span: Upper minus lower position limits.
-            speed: Maximum speeds.
-            most: Maximum accelerations.
-            bandwidth: α of the barriers that keep positions and speeds [1/s].
-        """
-        acceleration = np.minimum(bandwidth * speed, bandwidth**2 * (0.5 * span))
-        return cls(np.array(effort), np.minimum(acceleration, most), float(bandwidth))
-
-
-class Within(NamedTuple):
-    """Bounds on the acceleration, shapes (nv,)."""
-
-    lower: Array
-    upper: Array
-
-
-class Barred(NamedTuple):
-    """Rows of barriers: A δ ≥ lower for a deviation δ from the unconstrained a."""
-
-    A: Array  # shape (k, at least nv)
-    lower: Array  # shape (k,)
 
 
 class Shares(NamedTuple):
@@ -74,42 +37,30 @@ class Shares(NamedTuple):
 
 
 def limit_share(
-    M: Array,
-    a: Array,
-    effort: Array,
+    wanted: Wanted,
     law: BoundLaw,
     self_motion: Array,
     at_rest: Array,
-    bounds: Within,
-    permitted: Permitted,
-    barred: Barred,
+    limits: StepLimits,
 ) -> tuple[PartCall, Shares]:
     """Return the call that writes the shares, and its results.
 
     Args:
-        M: Mass matrix, shape (nv, nv).
-        a: The law's acceleration, and that of compensators, shape (nv,).
-        effort: M a + N, and the compensators' effort, shape (nv,).
+        wanted: The law's command.
         law: The law.
         self_motion: φ_N, shape (nv,).
         at_rest: J# Kp s(e), the command of the errors alone, shape (nv,).
-        bounds: Bounds on the acceleration.
-        permitted: The bounds to which excesses are relative.
-        barred: Rows of barriers, for deviations from a.
+        limits: The limits of the step.
     """
     shares = Shares(np.zeros(1), np.zeros(1))
     call = PartCall(
         engine.LimitShare,
-        M=M,
-        a=a,
-        effort=effort,
+        wanted=wanted,
         self_motion=self_motion,
         at_rest=at_rest,
         pulls=law.problem.pulls,
         mu=law.edge.share,
-        bounds=bounds,
-        permitted=permitted,
-        barred=barred,
+        limits=limits,
         large=LARGE,
         least=0.0 if law.problem.demands_known else 1.0,
         share=shares.by_limits,

@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 from hsp_control import engine
 from hsp_control.common.arrays import Array
-from hsp_control.edge.limit_share import Barred, Permitted, Within
+from hsp_control.edge.excess import StepLimits, Wanted
 from hsp_control.engine.plans import PartCall
 
 
@@ -33,35 +33,16 @@ class Parts(NamedTuple):
 
 
 def limited_target(
-    M: Array,
-    a: Array,
-    effort: Array,
-    parts: Parts,
-    bounds: Within,
-    permitted: Permitted,
-    barred: Barred,
-    share: Array,
+    wanted: Wanted, parts: Parts, limits: StepLimits, share: Array
 ) -> PartCall:
     """Return the call that overwrites the unconstrained a by the limited target.
 
     Args:
-        M: Mass matrix, shape (nv, nv).
-        a: The law's acceleration, and that of compensators, shape (nv,).
-        effort: M a + N, and the compensators' effort, shape (nv,).
+        wanted: The law's command; its acceleration and its effort are overwritten.
         parts: The law's acceleration, and its components.
-        bounds: Bounds on the acceleration.
-        permitted: The bounds to which excesses are relative.
-        barred: Rows of barriers; ``lower`` then is for deviations from the new a.
+        limits: The limits of the step; ``least`` then is for deviations from the new a.
         share: That of the damped law by limits, shape (1,).
     """
     return PartCall(
-        engine.LimitedTarget,
-        M=M,
-        a=a,
-        effort=effort,
-        parts=parts,
-        bounds=bounds,
-        permitted=permitted,
-        barred=barred,
-        share=share,
+        engine.LimitedTarget, wanted=wanted, parts=parts, limits=limits, share=share
     )

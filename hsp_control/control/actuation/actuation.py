@@ -36,12 +36,11 @@ from hsp_control.control.actuation.limited_step import (
     LimitedStep,
     QPOutcome,
     Status,
-    Wanted,
 )
 from hsp_control.control.actuation.limits_in_force import LimitSet
 from hsp_control.control.actuation.support import Support
 from hsp_control.edge import BoundLaw
-from hsp_control.edge.limit_share import Permitted
+from hsp_control.edge.excess import Permitted, Wanted
 from hsp_control.engine.plans import AnyCall, PartCall, PartCalls
 from hsp_control.robot import RobotState
 

@@ -33,8 +33,9 @@ from hsp_control.control.actuation.deviation_cost import (
 from hsp_control.control.actuation.dual_active_set import QP, Workspace
 from hsp_control.control.actuation.support import Support
 from hsp_control.edge import BoundLaw
+from hsp_control.edge.excess import Permitted, StepLimits, Wanted
 from hsp_control.edge.held_levels import held_levels
-from hsp_control.edge.limit_share import Barred, Permitted, Within, limit_share
+from hsp_control.edge.limit_share import limit_share
 from hsp_control.edge.limited_target import Parts, limited_target
 from hsp_control.engine.plans import AnyCall, OnlyIf, PartCall, PartCalls
 from hsp_control.robot import RobotState
@@ -81,15 +82,6 @@ class QPOutcome(NamedTuple):
         return cls(np.ones(1, dtype=np.int64), np.zeros(1, dtype=np.int64))
 
 
-class Wanted(NamedTuple):
-    """The law's command."""
-
-    mass_matrix: Array  # M, shape (nv, nv)
-    acceleration: Array  # a, shape (nv,)
-    # M a + N and friction, without contact forces, shape (nv,) [N·m or N]
-    effort: Array
-
-
 class Forces(NamedTuple):
     """The permitted contact forces f, see `Support`; size 0: none."""
 
@@ -133,29 +125,16 @@ Barriers = Mapping[str, tuple[Array, Array]]
 
 
 def _at_the_edge(
-    state: RobotState,
-    law: BoundLaw,
-    wanted: Wanted,
-    within: Within,
-    permitted: Permitted,
-    barred: Barred,
+    state: RobotState, law: BoundLaw, wanted: Wanted, limits: StepLimits
 ) -> tuple[PartCalls, Array, Array]:
     """Return the calls that write the desired step, costs of levels and the slack."""
     taken, (self_motions, brakings) = law.self_motions(state.v)
     parted, levels = law.by_levels(state.v)
-    limits = within, permitted, barred
     rest = levels.at_rest[-1]
-    shared, shares = limit_share(*wanted, law, self_motions[0], rest, *limits)
-    holding, held = held_levels(
-        *wanted,
-        state.v,
-        law,
-        levels,
-        shares.slack,
-        *limits,
-    )
+    shared, shares = limit_share(wanted, law, self_motions[0], rest, limits)
+    holding, held = held_levels(wanted, state.v, law, levels, shares.slack, limits)
     parts = Parts(law.acceleration, law.edge.damped, *self_motions, *brakings)
-    target = limited_target(*wanted, parts, *limits, shares.by_limits)
+    target = limited_target(wanted, parts, limits, shares.by_limits)
     return [taken, parted, shared, holding, target], held, shares.slack
 
 
@@ -278,9 +257,8 @@ class LimitedStep:
         self.held, self.slack = zeros(len(law.ends)), np.ones(1)
         if permitted is not None:
             kept = slice(barriers, contacts)
-            barred = Barred(A[kept], lower[kept])
-            given = state, law, wanted, Within(*bounds[:2]), permitted, barred
-            target, self.held, self.slack = _at_the_edge(*given)
+            limits = StepLimits(*bounds[:2], A[kept], lower[kept], permitted)
+            target, self.held, self.slack = _at_the_edge(state, law, wanted, limits)
             rows += target
         costs = self.held, self.slack
         levels = Levels.of(law, p > 0, state.robot.size or 1.0, *costs)

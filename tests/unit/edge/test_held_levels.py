@@ -16,8 +16,8 @@ from hsp_control.control.actuation.deviation_cost import (
     write_directions,
     write_inverse_root,
 )
+from hsp_control.edge.excess import Permitted, StepLimits, Wanted
 from hsp_control.edge.held_levels import STIFFEST, held_levels
-from hsp_control.edge.limit_share import Barred, Permitted, Within
 from hsp_control.edge.step import ByLevels, Factors, Projectors
 from hsp_control.engine.plans import planned
 from hsp_control.law import CONSTANT, IDENTITY
@@ -62,9 +62,7 @@ def drawn(seed: int, size: float, L: Array | None = None) -> dict[str, Any]:
     thresholds = rng.uniform(0.1, 3.0, size=len(ENDS))
     ends = np.array(ENDS)
     return {
-        "M": M,
-        "a": a,
-        "effort": M @ a + rng.normal(size=NV),
+        "wanted": Wanted(M, a, M @ a + rng.normal(size=NV)),
         "v": 0.1 * size * rng.normal(size=NV),
         "law": Law(
             Problem(Metric(L)),
@@ -79,9 +77,13 @@ def drawn(seed: int, size: float, L: Array | None = None) -> dict[str, Any]:
             Factors(triangle @ B, triangle),
         ),
         "slack": rng.choice([np.zeros(1), rng.uniform(size=1), np.ones(1)]),
-        "bounds": Within(-away[0], away[1]),
-        "permitted": Permitted(*(10.0 * rng.uniform(0.5, 2.0, size=(2, NV))), 10.0),
-        "barred": Barred(rng.normal(size=(2, NV)), -rng.uniform(1.0, 10.0, size=2)),
+        "limits": StepLimits(
+            -away[0],
+            away[1],
+            permitted=Permitted(*(10.0 * rng.uniform(0.5, 2.0, size=(2, NV))), 10.0),
+            rows=rng.normal(size=(2, NV)),
+            least=-rng.uniform(1.0, 10.0, size=2),
+        ),
     }
 
 
@@ -90,28 +92,29 @@ def at_rest(given: dict[str, Any], k: int) -> Array:
 
     In an equilibrium no limit of motion is negative.
     """
-    a, M, permitted = given["parts"].at_rest[k], given["M"], given["permitted"]
-    effort = given["effort"] + M @ (a - given["a"])
-    pushed = np.abs(effort) - permitted.effort
-    return np.concatenate([a, -a, pushed, pushed, -given["barred"].A @ a])
+    at_rest, limits = given["parts"].at_rest[k], given["limits"]
+    M, a, effort = given["wanted"]
+    pushed = np.abs(effort + M @ (at_rest - a)) - limits.permitted.effort
+    missing = -limits.rows @ at_rest
+    return np.concatenate([at_rest, -at_rest, pushed, pushed, missing])
 
 
 def braked(given: dict[str, Any]) -> Array:
     """Return how much each limit demands of a motion, 2 α c v; an effort's anything."""
-    v, A = given["v"], given["barred"].A
-    rates = np.abs([*v, *v, *np.full(2 * NV, np.inf), *(A @ v)])
-    return 2.0 * given["permitted"].bandwidth * rates
+    v, limits = given["v"], given["limits"]
+    rates = np.abs([*v, *v, *np.full(2 * NV, np.inf), *(limits.rows @ v)])
+    return 2.0 * limits.permitted.bandwidth * rates
 
 
 def excesses(given: dict[str, Any], change: Array) -> Array:
     """Return how far a + change is beyond each limit."""
-    a, effort = given["a"] + change, given["effort"] + given["M"] @ change
-    missing = given["barred"].lower - given["barred"].A @ change
-    bounds, permitted = given["bounds"], given["permitted"].effort
+    M, a, effort = given["wanted"]
+    a, effort = a + change, effort + M @ change
+    lower, upper, rows, least, permitted = given["limits"]
+    most, missing = permitted.effort, least - rows @ change
     return np.concatenate(
-        [a - bounds.upper, bounds.lower - a, effort - permitted, -effort - permitted,
-         missing]
-    )  # fmt: skip
+        [a - upper, lower - a, effort - most, -effort - most, missing]
+    )
 
 
 def costs(given: dict[str, Any]) -> list[float]:
@@ -119,8 +122,8 @@ def costs(given: dict[str, Any]) -> list[float]:
     law = given["law"]
     L_inverse = np.linalg.inv(law.problem.metric.L)
     joint = np.linalg.norm(L_inverse, axis=0).max()
-    E, M = np.eye(NV), given["M"]
-    rows = np.vstack([E, E, M, M, given["barred"].A]) @ L_inverse.T
+    E, M = np.eye(NV), given["wanted"].mass_matrix
+    rows = np.vstack([E, E, M, M, given["limits"].rows]) @ L_inverse.T
     length = np.linalg.norm(rows, axis=1)
     Q, X = given["parts"].factors
     parts, slack = (rows @ Q.T / length[:, None]) ** 2, given["slack"][0]
@@ -226,10 +229,11 @@ def test_a_deviation_rotates_slowly_enough_for_a_period(
         slack = np.array([share])
         law: Any = Law(metric, nothing, IDENTITY, ends, epsilon, np.ones(1))
         holding, held = held_levels(
-            np.eye(2), nothing, nothing, nothing, law, parts, slack,
-            Within(np.array([-np.inf, -np.inf]), np.array([-x, np.inf])),
-            Permitted(*np.full((2, 2), np.inf), 10.0),
-            Barred(np.zeros((0, 2)), np.zeros(0)),
+            Wanted(np.eye(2), nothing, nothing), nothing, law, parts, slack,
+            StepLimits(
+                np.full(2, -np.inf), np.array([-x, np.inf]), np.zeros((0, 2)),
+                np.zeros(0), Permitted(*np.full((2, 2), np.inf), 10.0),
+            ),
         )  # fmt: skip
         directions = Directions.of(2)
         levels = Levels(

@@ -7,13 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hsp_control.common.arrays import Array
-from hsp_control.edge.limit_share import (
-    LARGE,
-    Barred,
-    Permitted,
-    Within,
-    limit_share,
-)
+from hsp_control.edge.excess import Permitted, StepLimits, Wanted
+from hsp_control.edge.limit_share import LARGE, limit_share
 from hsp_control.edge.limited_target import Parts, limited_target
 from hsp_control.engine.plans import planned
 
@@ -22,15 +17,11 @@ seeds = st.integers(0, 2**32 - 1)
 
 
 class Asked(NamedTuple):
-    """Commanded accelerations, and the bounds of limits."""
+    """Commanded accelerations, and limits."""
 
-    M: Array
-    a: Array
-    effort: Array
+    wanted: Wanted
     parts: Parts
-    bounds: Within
-    permitted: Permitted
-    barred: Barred
+    limits: StepLimits
     share: Array  # of the damped law
 
 
@@ -43,36 +34,38 @@ def drawn(seed: int, size: float, bound: float) -> Asked:
     parts[0] = a.copy()
     away = bound * rng.uniform(0.1, 1.0, size=(2, NV))
     permitted = Permitted(*(bound * rng.uniform(0.5, 2.0, size=(2, NV))), 10.0)
-    rows = Barred(rng.normal(size=(2, NV)), -bound * rng.uniform(0.1, 1.0, size=2))
-    return Asked(
-        M, a, M @ a + rng.normal(size=NV), Parts(*parts), Within(-away[0], away[1]),
-        permitted, rows, rng.uniform(size=1),
-    )  # fmt: skip
+    rows, least = rng.normal(size=(2, NV)), -bound * rng.uniform(0.1, 1.0, size=2)
+    limits = StepLimits(-away[0], away[1], rows, least, permitted)
+    wanted = Wanted(M, a, M @ a + rng.normal(size=NV))
+    return Asked(wanted, Parts(*parts), limits, rng.uniform(size=1))
 
 
 def excess(given: Asked, change: Array) -> float:
     """Return the excess of a + change over its limits, relative to their range."""
-    a, effort = given.a + change, given.effort + given.M @ change
-    beyond = np.maximum(a - given.bounds.upper, given.bounds.lower - a)
-    found = [0.0, *(np.abs(effort) / given.permitted.effort - 1.0)]
-    found += list(beyond / given.permitted.acceleration)
-    missing = given.barred.lower - given.barred.A @ change
-    length = np.linalg.norm(given.barred.A, axis=1)
-    found += list(missing / length / given.permitted.acceleration.min())
+    M, a, effort = given.wanted
+    a, effort = a + change, effort + M @ change
+    lower, upper, rows, least, permitted = given.limits
+    beyond = np.maximum(a - upper, lower - a)
+    found = [0.0, *(np.abs(effort) / permitted.effort - 1.0)]
+    found += list(beyond / permitted.acceleration)
+    missing = (least - rows @ change) / np.linalg.norm(rows, axis=1)
+    found += list(missing / permitted.acceleration.min())
     return float(max(found))
 
 
 def times_permitted(given: Asked, x: Array) -> float:
     """Return the ratio of an acceleration to its bound."""
-    efforts = np.abs(given.M @ x) / given.permitted.effort
-    motions = np.abs(x) / given.permitted.acceleration
+    permitted = given.limits.permitted
+    efforts = np.abs(given.wanted.mass_matrix @ x) / permitted.effort
+    motions = np.abs(x) / permitted.acceleration
     return float(max(1.0, efforts.max(), motions.max()))
 
 
 def called(given: Asked) -> Asked:
     """Return the result of the call for a request."""
-    a, effort, lower = given.a.copy(), given.effort.copy(), given.barred.lower.copy()
-    made = given._replace(a=a, effort=effort, barred=Barred(given.barred.A, lower))
+    wanted = Wanted(*(each.copy() for each in given.wanted))
+    limits = given.limits._replace(least=given.limits.least.copy())
+    made = given._replace(wanted=wanted, limits=limits)
     planned([limited_target(*made)]).run(0.0)
     return made
 
@@ -91,25 +84,24 @@ def test_it_is_the_plain_formula(seed: int, size: float) -> None:
 
     found = called(requested)
     scale = 1e-12 * (1.0 + size)  # rounding of some 50 operations
-    np.testing.assert_allclose(found.a, requested.a + change, atol=scale)
+    M, a, effort = requested.wanted
+    np.testing.assert_allclose(found.wanted.acceleration, a + change, atol=scale)
     np.testing.assert_allclose(
-        found.effort, requested.effort + requested.M @ change, atol=100.0 * scale
+        found.wanted.effort, effort + M @ change, atol=100.0 * scale
     )
-    np.testing.assert_allclose(
-        found.barred.lower,
-        requested.barred.lower - requested.barred.A @ change,
-        atol=scale,
-    )
+    limits = requested.limits
+    least = limits.least - limits.rows @ change
+    np.testing.assert_allclose(found.limits.least, least, atol=scale)
 
 
 @given(seeds)
 def test_within_limits_nothing_changes(seed: int) -> None:
     """For any demand of the damped law and of a field."""
     requested = drawn(seed, 1e4, 10.0)
-    requested.a[:] = 0.0
-    requested.effort[:] = 0.0
-    requested.share[:] = 0.0
-    np.testing.assert_array_equal(called(requested).a, requested.a)
+    _, a, effort = requested.wanted
+    for each in (a, effort, requested.share):
+        each[:] = 0.0
+    np.testing.assert_array_equal(called(requested).wanted.acceleration, a)
 
 
 @given(seeds, st.floats(1e-6, 3.0))
@@ -119,30 +111,28 @@ def test_no_more_is_lost_than_is_beyond(seed: int, beyond: float) -> None:
     A larger loss at the onset of a violation makes the step oscillate about the limit.
     """
     requested = drawn(seed, 1.0, 10.0)
-    most = times_permitted(requested, 1e6 * requested.a) / 1e6
-    permitted = requested.a / most  # at the limits
+    M, given, _ = requested.wanted
+    most = times_permitted(requested, 1e6 * given) / 1e6
+    permitted = given / most  # at the limits
     a, field = (1.0 + beyond) * permitted, (5.0 + beyond) * permitted
-    zero = np.zeros(NV)
+    zero, far = np.zeros(NV), requested.limits.permitted.acceleration
     opposed = requested._replace(
-        a=a,
-        effort=requested.M @ a,
+        wanted=Wanted(M, a, M @ a),
         parts=Parts(a, a, field, field, zero, zero),
-        bounds=Within(
-            -requested.permitted.acceleration, requested.permitted.acceleration
-        ),
-        barred=Barred(requested.barred.A, np.full(2, -1e9)),
+        limits=requested.limits._replace(lower=-far, upper=far, least=np.full(2, -1e9)),
     )
-    lost = np.linalg.norm(a - called(opposed).a) / np.linalg.norm(field)
+    left = called(opposed).wanted.acceleration
+    lost = np.linalg.norm(a - left) / np.linalg.norm(field)
     assert lost <= beyond / (1.0 + beyond) * (1.0 + 1e-6) + 1e-12
 
 
 def test_an_excess_without_end_leaves_finite_numbers() -> None:
     """A joint of range 0 permits no acceleration: a is 0, or entirely beyond."""
     requested = drawn(0, 1.0, 10.0)
-    requested.permitted.acceleration[0] = 0.0
-    requested.bounds.upper[0] = requested.a[0] - 1.0
+    requested.limits.permitted.acceleration[0] = 0.0
+    requested.limits.upper[0] = requested.wanted.acceleration[0] - 1.0
     found = called(requested)
-    assert np.isfinite(found.a).all()
+    assert np.isfinite(found.wanted.acceleration).all()
 
 
 # --- the share of the damped law, and the slack --------------------------------------
@@ -160,9 +150,7 @@ class Law:
 
 def shares(asked: Asked, law: Any, own: Array, at_rest: Array) -> list[float]:
     """Return the share by limits, and the slack."""
-    limits = asked.bounds, asked.permitted, asked.barred
-    wanted = asked.M, asked.a, asked.effort
-    call, found = limit_share(*wanted, law, own, at_rest, *limits)
+    call, found = limit_share(asked.wanted, law, own, at_rest, asked.limits)
     planned([call]).run(0.0)
     return [float(each[0]) for each in found]
 
