@@ -21,7 +21,7 @@ from wording import wording
 import hsp_control as hsp
 from hsp_control import NullSpaceField, Rollout, __version__, load_experiment
 from hsp_control.cli import doctor, main, options, robot_table, stopwatch
-from hsp_control.cli.check import _where_exact, start_advice
+from hsp_control.cli.check import _where_exact, advice_of_run, start_advice
 from hsp_control.cli.interrupts import DeferredInterrupt
 
 MOVING = "paper/4_moving_obstacle"
@@ -248,6 +248,20 @@ def test_check_reports_targets_along_some_axes_and_of_hands_on_legs(
     assert ("reach" not in warned) if report is None else re.search(report, warned)
 
 
+def test_check_looks_to_the_end_of_a_run_that_begins_late(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """The target leaves the reach of 3 m at 1 s, when the run begins."""
+    tip = (
+        "tasks.tip={type: frame_position, axes: x, trajectory: {type: line, "
+        "origin: world, start: [1], end: [5], duration: 2}}"
+    )
+    late = ["--set", "simulation.start_time=1", "--set", "simulation.duration=1"]
+    assert main(["check", MOVING, "--set", tip, *late]) == 0
+    assert "reach by 2 m, from t = 1" in (warned := capsys.readouterr().err)
+    assert "most at 2 s" in warned
+
+
 def test_check_warns_of_motors_that_cannot_hold_the_robot(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
@@ -463,6 +477,18 @@ def test_help_is_printed_without_a_command(capsys: pytest.CaptureFixture[str]) -
     assert "COMMAND" in capsys.readouterr().out
 
 
+def test_the_advice_after_a_run_is_about_its_start() -> None:
+    """A stretched arm is singular; where the run ended is another question."""
+    stretched = load_experiment(MOVING, "start.coordinates=[0, 0, 0]")
+    begins = np.array([[1.0, 0.0], [1.0, 0.5]])
+    advice = [
+        list(advice_of_run(stretched, Rollout({"singular_values": values}, {})))
+        for values in (begins, begins[::-1])
+    ]
+    assert advice[0][0].startswith("The tasks tip are singular at the start")
+    assert advice[1] == []
+
+
 def test_a_package_whose_command_is_broken_stops_no_other(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -560,6 +586,21 @@ def test_doctor_marks_what_does_not_work_and_notes_the_rest(
     ]  # fmt: skip
 
 
+@pytest.mark.parametrize(
+    ("most", "user", "state"),
+    [((0, 99), 1000, "note"), ((20, 99), 1000, "ok"), ((0, 0), 0, "ok")],
+)
+def test_doctor_asks_for_the_priority_that_is_permitted_now(
+    most: tuple[int, int], user: int, state: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The soft limit: the hard one is only how far it could be raised."""
+    monkeypatch.setattr(doctor.resource, "getrlimit", lambda _: most)
+    monkeypatch.setattr(doctor.os, "geteuid", lambda: user)
+    monkeypatch.setattr(doctor.platform, "system", lambda: "Linux")
+    found = {each.topic: each.state for each in doctor._real_time()}
+    assert found["real-time rights"] == state
+
+
 def test_the_unit_of_the_largest_effort_is_that_of_its_joint(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -593,3 +634,14 @@ def test_check_prints_in_degrees_where_the_law_is_exact() -> None:
     )
     assert words.startswith("hand position below 0.012 m, hand orientation below 34°; ")
     assert words.endswith(" J is above 0.05 (0.31 at the start)")
+
+
+def test_the_law_is_exact_from_twice_its_threshold_of_singular_values(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """Or from a tenth of the robot's size, here 0.3, where that is more."""
+    for threshold, exact in ((0.03, 0.3), (0.4, 0.8)):
+        setting = f"null_space.singularity_threshold={threshold}"
+        assert main(["check", MOVING, "--json", "--set", setting]) == 0
+        found = json.loads(capsys.readouterr().out)["exact"]
+        assert found["singular_value"] == pytest.approx(exact)
