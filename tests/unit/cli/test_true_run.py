@@ -10,7 +10,7 @@ import pytest
 import hsp_control as hsp
 from hsp_control import RobotState, Rollout
 from hsp_control.cli import live, robot_process
-from hsp_control.cli.live_experiment import simulated_robot
+from hsp_control.cli.live_experiment import FINAL_HOLD, simulated_robot
 from hsp_control.cli.robot_process import RobotProcess
 from hsp_control.cli.true_run import with_tasks
 from hsp_control.common.errors import LiveError
@@ -168,6 +168,16 @@ def test_the_robot_s_log_is_kept_whatever_is_raised_while_it_is_completed(
     assert f"has its states only: {type(raised).__name__}" in capsys.readouterr().out
 
 
+def test_how_the_robot_ended_stays_in_its_log() -> None:
+    experiment = hsp.load_experiment(CONFIG)
+    run = hsp.load_experiment(CONFIG).run()
+    loop = Rollout({**run.columns, "live.phase": np.ones(len(run))}, run.meta)
+    truth = states_only(run, experiment)
+    truth.meta |= {"status": "stopped", "message": "its loop fell silent"}
+    made = with_tasks(truth, loop, experiment)
+    assert (made.status, made.meta["message"]) == ("stopped", "its loop fell silent")
+
+
 def test_the_later_phase_of_both_processes_is_logged() -> None:
     """The robot may stop by itself, and holds on when the loop has ended."""
     experiment = hsp.load_experiment(CONFIG)
@@ -214,6 +224,34 @@ def test_a_rehearsal_leaves_no_effort_in_the_drives() -> None:
     robot_process._warm_up(robot, experiment)
     logged = robot.plant.log_channels(0.0, robot.q, robot.v, tau)
     np.testing.assert_array_equal(logged["applied.tau"].value, tau)  # none before
+
+
+def test_a_simulated_robot_is_held_for_half_a_second_after_its_stop() -> None:
+    """Its log goes on after the loop's, which holds it for a shorter time."""
+    experiment = hsp.load_experiment(CONFIG | {"live": {"stop": {"hold": 0.05}}})
+    robot, held = simulated_robot(experiment), 0
+    robot.advance(
+        [experiment.robot.inverse_dynamics(experiment.q0, np.zeros(7), np.zeros(7))]
+    )
+    robot.halt("over")
+    while not robot.done:
+        robot.advance([])
+        held += robot.phase == Phase.HOLDING
+    assert held * robot.period == pytest.approx(FINAL_HOLD, abs=1.5 * robot.period)
+
+
+@pytest.mark.parametrize(("limits", "accepted"), [("none", False), (100.0, True)])
+def test_a_simulated_robot_accepts_what_its_controller_s_limits_permit(
+    limits: Any, accepted: bool
+) -> None:
+    """The URDF permits 87 N·m at the first joint, and 12 N·m at the last."""
+    given = limits if limits == "none" else {"effort": limits}
+    experiment = hsp.load_experiment(CONFIG | {"limits": given})
+    robot = simulated_robot(experiment)
+    effort = experiment.robot.inverse_dynamics(experiment.q0, np.zeros(7), np.zeros(7))
+    effort[0] = 95.0
+    robot.advance([effort])
+    assert (robot.phase == Phase.RUNNING) is accepted, robot.reason
 
 
 def test_a_closed_robot_process_leaves_no_socket() -> None:
