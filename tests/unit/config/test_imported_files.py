@@ -10,7 +10,10 @@ import hsp_control as hsp
 from hsp_control.cli.main import main
 from hsp_control.common.errors import ConfigError
 from hsp_control.config import import_file
+from hsp_control.config.logged_run import logged_controller
 from hsp_control.declaration import imported
+from hsp_control.robot.description.access import only_within
+from hsp_control.robot.description.sources import packaged_folders
 
 COSTS = """
 import hsp_control as hsp
@@ -88,3 +91,26 @@ def test_a_file_that_cannot_be_run(name: str, text: str | None, message: str) ->
         Path(name).write_text(text)
     with pytest.raises(ConfigError, match=message):
         import_file(name)
+
+
+def test_a_log_of_unchanged_code_has_its_controller_where_that_is_permitted(
+    costs: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As for the floor of a figure, which reads no file but packaged ones."""
+    assert main(["run", "x.yaml", "--import", str(costs)]) == 0
+    run, packaged = hsp.Rollout.load("out/x.npz"), only_within(packaged_folders())
+
+    def forget() -> None:
+        """A new program has not imported the code."""
+        sys.modules.pop(costs.stem, None)
+        monkeypatch.setattr(imported, "_functions", {})
+        hsp.NullSpaceField.family.members.pop("nod_of_a_test", None)
+        hsp.Barrier.family.members.pop("above_of_a_test", None)
+
+    forget()
+    assert logged_controller(run, packaged) is None
+    assert costs.stem not in sys.modules
+    assert logged_controller(run, packaged, imports_code=True) is not None
+    forget()
+    costs.write_text(COSTS + "# edited\n")
+    assert logged_controller(run, packaged, imports_code=True) is None

@@ -130,6 +130,17 @@ def test_how_long_efforts_were_held_is_logged_where_rows_have_whole_periods(
     assert config["simulation"]["control_period"] == (held and pytest.approx(held))
 
 
+def test_a_late_row_does_not_delay_those_after_it() -> None:
+    """Rows are due every 2.5 periods, and written at the next period."""
+    controller = law(hsp.JointCentering())
+    q, v = controller.robot.home(), np.zeros(7)
+    with hsp.Recorder(controller, log_period=2.5 * PERIOD) as recorder:
+        for k in range(11):
+            recorder.record(controller.compute(PERIOD * k, q, v))
+    rows = np.array([0, 3, 5, 8, 10])
+    np.testing.assert_array_equal(recorder.rollout.t, PERIOD * rows)
+
+
 def test_an_unrepeatable_run_gives_the_reason_and_an_error_ends_the_log(
     tmp_path: Path,
 ) -> None:
