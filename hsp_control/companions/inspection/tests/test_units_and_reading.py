@@ -75,6 +75,11 @@ def test_shapes_determine_the_size_of_a_link(look: Look) -> None:
     assert "units" in look(wide)
     with_tool = wide.replace("</inertial>", f"</inertial>{tool}")
     assert "units" not in look(with_tool)
+    ball = tool.replace('cylinder radius="0.02" length="2"', 'sphere radius="{}"')
+    for radius, named in ((1.0, False), (0.9, True)):  # k = 3 m, of a third of it
+        large = ball.replace('xyz="1 0 0"', 'xyz="0.1 0 0"').format(radius)
+        with_ball = wide.replace("</inertial>", f"</inertial>{large}")
+        assert ("units" in look(with_ball)) is named
 
 
 @pytest.mark.parametrize(("factor", "message", "cure"), [
@@ -215,6 +220,10 @@ def test_followers_that_bound_their_leaders_are_named(look: Look) -> None:
     (narrow,) = found(2.0)
     assert narrow.severity == "note"
     assert "its limits keep its leader 'leader' within -1.5 to 1.5" in narrow.message
+    mimic = follow("leader", 0.9, 1.0)  # the leader's own lower limit is narrower
+    text = chain(("leader", "revolute", ""), ("follower", "revolute", mimic))
+    (narrow,) = look(text)["mimic"]
+    assert "keep its leader 'leader' within -3 to 2.222" in narrow.message
     mimic = follow("leader", 1.0, 9.0)
     text = chain(("leader", "revolute", ""), ("follower", "revolute", mimic))
     (never,) = look(text)["mimic"]
