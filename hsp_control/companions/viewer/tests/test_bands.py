@@ -75,6 +75,22 @@ def test_bands_are_the_logs_columns(obstacle: tuple[Experiment, Rollout]) -> Non
     assert [band.name for band in bands_of(run, None)] == ["limit active"]
 
 
+@pytest.mark.parametrize("deepest", ["obstacle_clearance", "self_clearance"])
+def test_a_collision_is_as_deep_as_the_deepest_of_all_distances(
+    deepest: str, obstacle: tuple[Experiment, Rollout]
+) -> None:
+    fields = "{type: obstacle_clearance, obstacles: [ball]}, {type: self_clearance}"
+    both = load_experiment("panda_obstacle", f"null_space.fields=[{fields}]", *FAST)
+    _, run = obstacle
+    apart = np.full(len(run), 0.3)
+    columns = {f"distance.{kind}_clearance": apart for kind in ("obstacle", "self")}
+    columns[f"distance.{deepest}"] = np.where(run.t < 0.1, -0.05, apart)
+    bands = bands_of(altered(run, **columns), both.controller)
+    (collision,) = (band for band in bands if band.name == "collision")
+    assert collision.caption == "collision, up to 5.0 cm deep"
+    assert collision.spans == [pytest.approx((0.0, 0.1))]
+
+
 def test_a_target_out_of_reach_is_reported_with_its_distance(
     obstacle: tuple[Experiment, Rollout],
 ) -> None:

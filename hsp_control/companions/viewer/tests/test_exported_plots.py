@@ -10,11 +10,13 @@ import hsp_control.companions.plots as plots
 from hsp_control import Rollout, load_experiment
 from hsp_control.cli import main
 from hsp_control.common.errors import ExportError
+from hsp_control.companions.plots import palette
 from hsp_control.companions.plots.analysis import expected_floor
 from hsp_control.companions.plots.log_series import held_period
 from hsp_control.companions.viewer import ComparedRun, export_html
 from hsp_control.companions.viewer.packing import ArrayTable
 from hsp_control.companions.viewer.page_plots import Edge, Panel, pack_panels, panels_of
+from hsp_control.law import MetricSample
 
 PLANAR = "paper/4_moving_obstacle"
 
@@ -55,6 +57,28 @@ def test_the_floor_is_the_measured_one_and_falls_with_the_period(name: str) -> N
         sizes.append(np.sqrt(np.mean(measured**2)))
     expected = np.divide(periods, periods[0])
     np.testing.assert_allclose(np.divide(sizes, sizes[0]), expected, rtol=0.05)
+
+
+def test_the_floor_is_a_norm_in_the_metric() -> None:
+    """After one row: P (1 - exp(-K_N Δt))/(K_N Δt) h/2 P M⁻¹ Δτ, from e_N = 0."""
+    run = run_of(
+        "null_space.metric={type: mass_matrix}", "simulation.duration=0.05",
+        "simulation.control_period=0.002", name="panda_obstacle",
+    )  # fmt: skip
+    log, controller = run.rollout, run.controller
+    assert controller is not None
+    floor = expected_floor(log, controller)
+    assert floor is not None
+    state = run.robot.state(log.t[0], log.q[0], log.v[0])
+    L = controller.metric.evaluate(state, MetricSample.allocate(7)).L
+    W, J = L @ L.T, state.frame("panda_tcp").jacobian
+    P = np.eye(7) - np.linalg.solve(W, J.T) @ np.linalg.inv(
+        J @ np.linalg.solve(W, J.T)
+    ) @ J  # fmt: skip
+    change = np.linalg.solve(state.mass_matrix, log.tau[1] - log.tau[0])
+    decayed = 10.0 * (log.t[1] - log.t[0])  # K_N Δt
+    e = 0.5 * 0.002 * (1.0 - np.exp(-decayed)) / decayed * P @ change
+    assert floor[1] == pytest.approx(np.sqrt(e @ W @ e), rel=1e-6)
 
 
 def test_where_no_floor_is_known_none_is_drawn(
@@ -163,6 +187,19 @@ def test_bounds_of_all_compared_runs_are_drawn(planar: ComparedRun) -> None:
     panels = pack_panels(plots, ArrayTable())["panels"]
     (edges,) = (each["edges"] for each in panels if each["title"] == "Minimum distance")
     assert [each["value"] for each in edges] == [0.2, 0.3]
+
+
+def test_a_curve_has_one_colour_in_all_compared_runs(planar: ComparedRun) -> None:
+    """Also where another curve stands before it, which would have its colour."""
+    log = planar.rollout
+    other = {"distance.other": log["distance.point_distance"] + 1.0}
+    more = Rollout({**other, **log.columns}, log.meta)
+    plots = [planar._replace(name="a"), planar._replace(name="b", rollout=more)]
+    panels = pack_panels(plots, ArrayTable())["panels"]
+    (curves,) = (p["series"] for p in panels if p["title"] == "Minimum distance")
+    disk, added, again = ((each["name"], each["color"]) for each in curves)
+    assert added == ("other", palette.series(0))
+    assert disk == again == ("joint to centre of disk", palette.series(0))
 
 
 def test_a_note_says_how_many_milliseconds_an_effort_is_held() -> None:

@@ -723,6 +723,18 @@ def test_obstacles_of_runs_side_by_side_stand_beside_their_robots() -> None:
     )
 
 
+def test_compared_runs_are_shown_from_the_first_start_to_the_last_end() -> None:
+    experiment = load_experiment(PLANAR, "simulation.duration=0.1")
+    robot, run = experiment.robot, experiment.run()
+    late = Rollout({**run.columns, "t": run.t + 2.0}, run.meta)
+    for order in ((run, late), (late, run)):
+        runs = [ComparedRun(str(k), robot, each) for k, each in enumerate(order)]
+        clip = Comparison(
+            RobotDrawing(robot), runs, shown={}, beside=None, dark=False
+        ).clip()
+        assert (clip.start, clip.end) == (0.0, late.t[-1])
+
+
 def test_a_half_space_that_turns_is_drawn_as_it_is_at_the_start() -> None:
     wall, floor = [np.sqrt(0.5), 0.0, 0.0, np.sqrt(0.5)], [0.0, 0.0, 0.0, 1.0]
     for turns, upward in (([wall, floor], 0.0), ([floor, wall], 1.0)):
