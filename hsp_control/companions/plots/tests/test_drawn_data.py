@@ -32,6 +32,7 @@ from hsp_control import (
     simulate,
 )
 from hsp_control.companions.plots import figures, log_series, palette, world
+from hsp_control.companions.plots.curves import draw_lines
 from hsp_control.companions.plots.frames import draw_frame
 from hsp_control.companions.plots.log_series import decay_power, predicted_decay
 from hsp_control.companions.viewer.targets import read_targets
@@ -271,6 +272,11 @@ def test_obstacles_are_their_outlines(logs: dict[str, Rollout]) -> None:
         [-0.1, -0.2, 0.0],
         [0.1, 0.2, 0.3],
     ),
+    (
+        shapes.HeightField((0.2, 0.4), [[0.1, 0.2], [0.2, 0.3]]),
+        [-0.1, -0.2, 0.1],
+        [0.1, 0.2, 0.3],
+    ),
 ])  # fmt: skip
 def test_an_obstacle_is_drawn_as_large_as_it_is(
     shape: shapes.Shape, low: list[float], high: list[float]
@@ -279,6 +285,31 @@ def test_an_obstacle_is_drawn_as_large_as_it_is(
     points, radius = world._POINTS_OF_SHAPE[type(shape).__name__](shape_to_log(shape))
     np.testing.assert_allclose(points.min(axis=0) - radius, low, atol=1e-12)
     np.testing.assert_allclose(points.max(axis=0) + radius, high, atol=1e-12)
+
+
+@pytest.mark.parametrize("length", [0.19, 0.2, 0.7, 3.0])
+def test_the_axes_of_a_frame_are_as_long_as_their_label_says(length: float) -> None:
+    """The largest of 1, 2 and 5 times a power of ten that fits."""
+    axes = drawn(world.draw_axis_directions, world.oblique(), np.zeros(3), length)
+    size = {0.19: 0.1, 0.2: 0.2, 0.7: 0.5, 3.0: 2.0}[length]
+    assert [text.get_text() for text in axes.texts] == ["x", "y", f"z  ({size:g} m)"]
+    for line, axis in zip(axes.lines, np.eye(3), strict=True):
+        ends = np.column_stack(world.oblique().project(np.array([0.0 * axis, axis])))
+        np.testing.assert_allclose(line.get_xydata(), size * ends, atol=1e-12)
+
+
+@pytest.mark.parametrize(("value", "edges"), [
+    (-1.39, [-1.0]), (-1.41, []), (-2.59, []), (-2.61, [-3.0]),
+])  # fmt: skip
+def test_a_limit_is_drawn_within_a_fifth_of_the_joint_s_range(
+    value: float, edges: list[float]
+) -> None:
+    """Of -3 to -1 rad, as of an elbow: the range is 2 rad."""
+    values = np.array([[-2.0], [value], [-2.0]])
+    limits = np.array([-3.0]), np.array([-1.0])
+    axes = drawn(draw_lines, np.arange(3.0), values, ["elbow"], ["rad"], limits)
+    _, *limit_lines = axes.lines
+    assert [float(line.get_ydata()[0]) for line in limit_lines] == edges
 
 
 # --- the prediction of e_N -----------------------------------------------------------
