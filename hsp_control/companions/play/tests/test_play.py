@@ -135,6 +135,20 @@ def test_the_elbow_of_the_posture_leads_the_null_space(tmp_path: Path) -> None:
     np.testing.assert_array_equal(again.q, log.q)
 
 
+def test_a_returned_elbow_is_led_again_as_for_the_first_time(still: Session) -> None:
+    """From the field's own posture, not from the one to which it was dragged."""
+    grip, led = still.handles.targets["posture"], list[Array]()
+    wanted = pose_of(still, "posture")
+    wanted[1] += 0.1
+    for _ in range(2):
+        still.receive({"do": "move", "target": "posture", "pose": wanted.tolist()})
+        led.append(grip._target.copy())  # type: ignore[attr-defined]
+        go(still, 0.1)
+        still.receive({"do": "resume", "target": "posture"})
+        go(still, 2.0)
+    np.testing.assert_array_equal(*led)
+
+
 def test_a_return_is_no_jolt(still: Session) -> None:
     """A target and an obstacle dragged far away return at a limited speed."""
     go(still, 0.1)
@@ -444,6 +458,20 @@ def test_the_log_has_an_end(session: Session, monkeypatch: pytest.MonkeyPatch) -
         session.advance()
     assert session.over == "the log is full at t = 0 s; reset to go on"
     assert len(session.rollout()) == 11
+
+
+def test_another_law_goes_beside_it_up_to_the_last_row_of_the_log(
+    session: Session, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("hsp_control.companions.play.session.LONGEST", 0.1)
+    session.reset()
+    go(session, 0.04)
+    session.receive({"do": "compare", "law": "no field"})
+    assert session.other is not None
+    while not session.over:
+        session.advance()
+    assert session.t == pytest.approx(0.1)
+    assert session.other.controller.state.t == session.t
 
 
 # --- the picture and the loop --------------------------------------------------------

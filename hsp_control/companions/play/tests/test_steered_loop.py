@@ -3,6 +3,7 @@
 import json
 from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,7 @@ import pytest
 
 import hsp_control as hsp
 from hsp_control.cli.live_experiment import simulated_robot
+from hsp_control.companions.play import steering
 from hsp_control.companions.play.live_loop import (
     TIMEOUT,
     Channel,
@@ -106,7 +108,9 @@ def test_a_dragged_target_is_reached(steered: Steered) -> None:
     assert np.abs(log["task.hand.error"][log.t > 0.1]).max() < 1e-3
     words = steered.page.receive(1000)
     assert words[-1]["values"]["null_space_gain"] == 20.0
-    assert any("cannot do" in word["message"] for word in words)
+    refused = [word for word in words if "cannot do" in word["message"]]
+    assert refused
+    assert [word["warning"] for word in words] == [word in refused for word in words]
     np.testing.assert_allclose(words[-1]["targets"]["hand"][:3], pose[:3], atol=1e-9)
 
 
@@ -213,3 +217,20 @@ def test_a_page_whose_process_ends_is_a_fault(steered: Steered) -> None:
     report = steered.run(1.0)
     assert "the process of the page has ended" in report.reason
     assert steered.requests.fault
+
+
+def test_the_rate_of_a_live_loop_is_that_of_the_last_second(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Of a loop at half of real time that waited for 100 s first."""
+    clock: list[float] = [500.0]
+    rates: list[float] = []
+    monkeypatch.setattr(steering, "monotonic", lambda: clock[-1])
+    monkeypatch.setattr(steering, "sleep", lambda s: clock.append(clock[-1] + s))
+    monkeypatch.setattr(steering, "_ended", lambda: clock[-1] > 505.0)
+    mirror: Any = SimpleNamespace(t=100.0, over="")
+    mirror.read = lambda: setattr(mirror, "t", 100.0 + 0.5 * (clock[-1] - 500.0))
+    picture: Any = SimpleNamespace(draw=lambda running, rate: rates.append(rate))
+    steering._show(mirror, picture, SimpleNamespace(messages=list))  # type: ignore[arg-type]
+    assert set(np.round(rates, 3)) == {0.0, 0.5}  # none before the first second
+    assert rates[-1] == pytest.approx(0.5)
