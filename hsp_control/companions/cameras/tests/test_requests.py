@@ -110,3 +110,23 @@ def test_no_timer_outlives_its_request(
         if isinstance(timer, threading.Timer) and "_hang_up" in repr(timer.function):
             timer.join(10.0)  # one that is cancelled ends at once
             assert not timer.is_alive()
+
+
+@pytest.mark.parametrize("width", ["0", "2049", "-1", "1.5"])
+def test_a_picture_that_cannot_be_drawn_is_refused(width: str) -> None:
+    with pytest.raises(ValueError, match=f"^width={width}; needs width and height"):
+        pictures._asked(f"/left/above.jpg?width={width}", ["left/above"])
+
+
+def test_a_request_names_camera_format_and_size() -> None:
+    cameras = ["left/above", "a.b"]
+    whole = {"width": 640, "height": 480}
+    for path, found in (
+        (
+            "/left/above.png?width=1&height=2048",
+            (0, "png", {"width": 1, "height": 2048}),
+        ),
+        ("/left%2Fabove.jpg?height=90", (0, "jpg", whole | {"height": 90})),
+        ("/a.b.jpg", (1, "jpg", whole)),
+    ):
+        assert pictures._asked(path, cameras) == found

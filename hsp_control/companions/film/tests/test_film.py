@@ -11,7 +11,7 @@ from wording import wording
 from hsp_control import Rollout, load_experiment
 from hsp_control.cli import main
 from hsp_control.common.errors import ExportError
-from hsp_control.companions.film import FilmStyle, encoding, export_film
+from hsp_control.companions.film import FilmStyle, encoding, export_film, film
 from hsp_control.companions.film.screenshots import frame_times
 
 PLANAR = "paper/4_moving_obstacle"
@@ -47,6 +47,19 @@ def test_a_film_that_cannot_be_is_refused(
 ) -> None:
     with pytest.raises(ExportError, match=message):
         export_film(planar, tmp_path / name, style=style)
+
+
+@pytest.mark.parametrize(("name", "size", "frame_rate"), [
+    ("film.mp4", (1280, 720), 30.0),
+    ("film.gif", (800, 450), 20.0),
+    ("film.WebP", (800, 450), 20.0),
+])  # fmt: skip
+def test_films_for_a_page_or_a_message_are_smaller(
+    name: str, size: tuple[int, int], frame_rate: float
+) -> None:
+    assert film._checked_format(Path(name), FilmStyle()) == (size, frame_rate)
+    own = FilmStyle(size=(640, 360), frame_rate=25.0)
+    assert film._checked_format(Path(name), own) == ((640, 360), 25.0)
 
 
 @pytest.mark.slow
