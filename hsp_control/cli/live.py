@@ -48,7 +48,7 @@ _DRY_RUN_OF_A_PLAN = 3.0  # the same with a plan, which must make its first step
 def live(options: argparse.Namespace) -> int:
     """Run a loop in real time, print its response times and why it ended."""
     faults = Faults.parse(options.faults)
-    loaded = load_scenario(read(options))
+    loaded = load_scenario(read(options)).from_zero()
     simulation = loaded.scenario.simulation
     duration = simulation.duration if options.duration is None else options.duration
     if not duration > 0.0:

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from hsp_control.cli.loading import load
+from hsp_control.cli.loading import read
 from hsp_control.common.arrays import Array
 from hsp_control.common.errors import HardwareError
 from hsp_control.config import Experiment
@@ -26,7 +26,7 @@ FINAL_HOLD = 0.5
 
 def of_a_robot(document: Document) -> Experiment:
     """Return the experiment of a robot, whose loop receives the streams."""
-    loaded = load_scenario(document)
+    loaded = load_scenario(document).from_zero()
     return Experiment.of(loaded._replace(scenario=deaf(loaded.scenario)))
 
 
@@ -79,4 +79,4 @@ def begun_where_it_is(
             f"configuration's start; {_FARTHEST:g} is allowed. Move the robot there, "
             f"or begin where it is, after a rehearsal: --set '{start}'"
         )
-    return load(options, start)
+    return Experiment.of(load_scenario(read(options, start)).from_zero())

@@ -4,7 +4,7 @@ from dataclasses import replace
 from functools import reduce
 from operator import getitem
 from pathlib import Path
-from typing import NamedTuple, TypeVar
+from typing import NamedTuple, Self, TypeVar
 
 from pydantic import TypeAdapter, ValidationError
 
@@ -43,6 +43,11 @@ class LoadedScenario(NamedTuple):
         if start.is_found:
             return self.robot.home()
         return start.configuration_of(self.robot, contacts)
+
+    def from_zero(self) -> Self:
+        """Return it for a run that begins at t = 0, as live runs and plays do."""
+        settings = replace(self.scenario.simulation, start_time=0.0)
+        return self._replace(scenario=replace(self.scenario, simulation=settings))
 
 
 def load_scenario(document: Document) -> LoadedScenario:

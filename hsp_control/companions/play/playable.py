@@ -13,7 +13,7 @@ from hsp_control.companions.play.session import ROW
 from hsp_control.companions.plots.palette import STAGE
 from hsp_control.config import Experiment
 from hsp_control.config.document import Document, read_document
-from hsp_control.config.experiment import build
+from hsp_control.config.loaded_scenario import load_scenario
 from hsp_control.geometry.links import link_shapes
 from hsp_control.robot import Robot
 from hsp_control.robot.description.sources import is_robot
@@ -25,7 +25,8 @@ def playable(
     source: str | PathLike[str], *overrides: str, **reading: Any
 ) -> Experiment:
     """Return the experiment of `playable_document`."""
-    return build(playable_document(source, *overrides, **reading))
+    document = playable_document(source, *overrides, **reading)
+    return Experiment.of(load_scenario(document).from_zero())
 
 
 def playable_document(

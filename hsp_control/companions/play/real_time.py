@@ -124,7 +124,7 @@ def play_command(options: argparse.Namespace) -> int:
             allow=options.allow,
         )
         add_imports(document, imports)
-        loaded = load_scenario(document)
+        loaded = load_scenario(document).from_zero()
         view = loaded.scenario.view.all_fields()
         viewer = Viewer(loaded.robot, transport=server, **view)
         draw_before(viewer, loaded)

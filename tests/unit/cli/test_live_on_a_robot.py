@@ -38,15 +38,25 @@ class Somewhere(InProcessRobot):
             self.robot.halt("a door was opened")
 
 
+class Here(InProcessRobot):
+    """A robot at the configuration's start, which does not tell where it is."""
+
+    def __init__(self, *_: object) -> None:
+        super().__init__(simulated_robot(load_experiment("panda_obstacle")))
+
+
 @pytest.fixture(autouse=True)
 def offered(monkeypatch: pytest.MonkeyPatch) -> None:
-    entry = EntryPoint("some", f"{__name__}:Somewhere", "hsp_control.hardware")
-    monkeypatch.setattr(live_hardware, "entry_points", lambda group: {"some": entry})
+    entries = {
+        name: EntryPoint(name, f"{__name__}:{kind}", "hsp_control.hardware")
+        for name, kind in (("some", "Somewhere"), ("here", "Here"))
+    }
+    monkeypatch.setattr(live_hardware, "entry_points", lambda group: entries)
 
 
-def command(tmp_path: Path, address: str) -> list[str]:
+def command(tmp_path: Path, address: str, kind: str = "some") -> list[str]:
     words = ["live", "panda_obstacle", "--duration", "0.1", "--out", str(tmp_path)]
-    return [*words, "--robot", f"some://{address}"]
+    return [*words, "--robot", f"{kind}://{address}"]
 
 
 @pytest.mark.system
@@ -66,6 +76,24 @@ def test_it_begins_where_the_robot_is(
     printed = " ".join(capsys.readouterr().out.split())
     for name, words in summary_rows(run):
         assert " ".join(f"{name} {words}".split()) in printed
+
+
+@pytest.mark.system
+@pytest.mark.parametrize("kind", ["some", "here"])
+def test_a_live_run_begins_at_0_and_so_does_its_repetition(
+    kind: str, tmp_path: Path
+) -> None:
+    """Also of a configuration whose simulation begins later."""
+    late = ["--set", "simulation.start_time=2"]
+    assert main([*command(tmp_path, "hold", kind), *late]) == 0
+    log = tmp_path / "panda_obstacle-live.npz"
+    run, again = Rollout.load(log), load_experiment(log).run()
+    assert run.t[0] == again.t[0] == 0.0
+    running = again.t < 0.1
+    name = "task.hand.reference"
+    np.testing.assert_allclose(
+        again[name][running], run[name][: running.sum()], atol=1e-9
+    )
 
 
 @pytest.mark.system

@@ -84,6 +84,18 @@ def test_a_dragged_target_is_reached_and_the_log_repeats_it(
     np.testing.assert_array_equal(again.tau, log.tau)
 
 
+def test_a_play_begins_at_0_and_so_does_the_repetition_of_its_log(
+    tmp_path: Path,
+) -> None:
+    """Also of a configuration whose simulation begins later."""
+    session = Session(playable(PANDA, COARSE, "simulation.start_time=2"))
+    go(session, 0.2)
+    log = session.rollout()
+    again = hsp.load_experiment(log.save(tmp_path / "play.npz")).run()
+    assert log.t[0] == again.t[0] == 0.0
+    np.testing.assert_array_equal(again.q, log.q)
+
+
 def test_its_own_path_comes_back(session: Session) -> None:
     untouched = Session(session.experiment)
     go(session, 0.5)
