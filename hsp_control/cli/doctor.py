@@ -81,9 +81,10 @@ def _dynamics() -> Check:
 
 def _threads() -> Check:
     """Check whether BLAS would start threads for small matrices."""
-    names = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS")
+    names = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS")  # the first one is used
     given = {name: os.environ[name] for name in names if name in os.environ}
-    if "1" in given.values():
+    used = (value for value in given.values() if value.isdecimal() and int(value))
+    if next(used, "") == "1":
         return Check("BLAS threads", "ok", "1")
     said = ", ".join(f"{name}={value}" for name, value in given.items())
     return Check(

@@ -586,6 +586,30 @@ def test_doctor_marks_what_does_not_work_and_notes_the_rest(
     ]  # fmt: skip
 
 
+@pytest.mark.parametrize(("openblas", "omp", "found"), [
+    ("1", None, "1"),
+    ("1", "8", "1"),
+    (None, "1", "1"),
+    ("0", "1", "1"),
+    ("8", "1", "OPENBLAS_NUM_THREADS=8, OMP_NUM_THREADS=1"),
+    (None, "8", "OMP_NUM_THREADS=8"),
+])  # fmt: skip
+def test_doctor_reports_the_threads_that_openblas_starts(
+    openblas: str | None,
+    omp: str | None,
+    found: str,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Its own variable comes before that of OpenMP."""
+    given = {"OPENBLAS_NUM_THREADS": openblas, "OMP_NUM_THREADS": omp}
+    for name, value in given.items():
+        monkeypatch.delenv(name, raising=False)
+        if value is not None:
+            monkeypatch.setenv(name, value)
+    check = doctor._threads()
+    assert (check.state, check.found) == ("ok" if found == "1" else "note", found)
+
+
 @pytest.mark.parametrize(
     ("most", "user", "state"),
     [((0, 99), 1000, "note"), ((20, 99), 1000, "ok"), ((0, 0), 0, "ok")],
