@@ -114,7 +114,9 @@ def _checked_format(path: Path, style: FilmStyle) -> tuple[tuple[int, int], floa
         )
     light = path.suffix.lower() != ".mp4"
     size = style.size or ((800, 450) if light else (1280, 720))
-    frame_rate = style.frame_rate or (20.0 if light else 30.0)
+    frame_rate = style.frame_rate
+    if frame_rate is None:
+        frame_rate = 20.0 if light else 30.0
     if not all(_MIN_SIZE <= edge <= _MAX_SIZE for edge in size):
         raise ExportError(
             f"a film of {size[0]}x{size[1]} pixels: width and height must be between "

@@ -36,6 +36,7 @@ def test_a_films_moments_are_evenly_spread() -> None:
     ("film.mpg", FilmStyle(), r"must be one of \.mp4.* did you mean '\.mp4'"),
     ("film.mp4", FilmStyle(size=(10, 400)), "10x400 pixels: width and height must"),
     ("film.gif", FilmStyle(frame_rate=0.5), "frame rate 0.5 Hz"),
+    ("film.gif", FilmStyle(frame_rate=0.0), "frame rate 0 Hz: must be between 1"),
     ("film.gif", FilmStyle(speed=0.0), "speed 0 must be positive"),
     ("film.gif",
      FilmStyle(start=2, end=1),
