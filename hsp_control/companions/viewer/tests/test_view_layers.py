@@ -371,6 +371,13 @@ def test_a_zone_lies_at_the_influence_from_its_obstacle(
         assert distance == pytest.approx(influence, abs=slack + 2e-6)
 
 
+def test_the_points_of_a_cloud_are_cubes_of_its_resolution() -> None:
+    cloud = PointCloud([[0.0, 0, 0], [0.1, 0, 0.4]], 0.02)
+    points = surface_points(obstacle(cloud, 1.0, upward=1.0))
+    np.testing.assert_allclose(points.min(axis=0), [-0.01] * 3, atol=1e-7)
+    np.testing.assert_allclose(points.max(axis=0), [0.11, 0.01, 0.41], atol=1e-7)
+
+
 @pytest.mark.parametrize("reaches", [(0.3, 0.1), (0.1, 0.3)])
 def test_the_zone_of_two_fields_is_that_of_the_farther_one(
     reaches: tuple[float, float],

@@ -8,10 +8,12 @@ import numpy as np
 import pinocchio as pin
 import pytest
 from clips import Clip, Recorder, reported
+from robot_texts import joint as joint_text
+from robot_texts import link, robot_xml
 
 from hsp_control import Obstacle, Robot, Rollout, load_experiment
 from hsp_control.common.errors import ViewerError
-from hsp_control.companions.viewer import Viewer, robot_of, view_logs
+from hsp_control.companions.viewer import Viewer, robot_of, stage, view_logs
 from hsp_control.companions.viewer.commands import CAMERA, CAPTION, CLIP, unpack
 from hsp_control.companions.viewer.mesh_files import with_files
 from hsp_control.companions.viewer.motion import motion_of
@@ -142,6 +144,21 @@ def test_a_state_is_shown_with_its_row_of_the_run(
     viewer.show(arm.state(0.25, q, run.v[37]))
     clock = reported(recorder, CAPTION, "time")
     assert clock["text"] == "t = 0.25 s"
+
+
+@pytest.mark.parametrize(("axis", "eye"), [
+    ("0 0 1", [0, 0, 1]), ("0 0 -1", [0, 0, 1]),
+    ("0 1 0", [0, -1, 0]), ("0 -1 0", [0, -1, 0]),
+    ("1 0 0", [1, 0, 0]), ("-1 0 0", [1, 0, 0]),
+])  # fmt: skip
+def test_a_planar_arm_is_seen_from_above_or_with_its_x_or_y_to_the_right(
+    axis: str, eye: list[float], tmp_path: Path
+) -> None:
+    level = joint_text("a", "base", "one").replace(' rpy="0.3 0.2 0.1"', "")
+    turning = level.replace('axis xyz="0 0 1"', f'axis xyz="{axis}"')
+    urdf = tmp_path / "planar.urdf"
+    urdf.write_text(robot_xml(link("base"), link("one"), turning))
+    np.testing.assert_array_equal(stage.plane_normal(Robot.load(urdf)), eye)
 
 
 SHAPES: list[shapes.Shape] = [
