@@ -11,6 +11,7 @@ import pytest
 
 import hsp_control as hsp
 from hsp_control.cli import main
+from hsp_control.cli.live_experiment import live_period
 from hsp_control.common.errors import ViewerError
 from hsp_control.companions.play import steering
 from hsp_control.companions.play.live_loop import channel_pair
@@ -96,6 +97,24 @@ def test_a_silent_page_ends_the_wait(
     with pytest.raises(ViewerError, match=r"did not start within 0\.05 s"):
         page.__enter__()
     assert page._process.poll() is not None
+
+
+def test_a_page_shows_no_rows_of_an_earlier_loop(
+    experiment: hsp.Experiment, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    said = list[dict[str, Any]]()
+    page = object.__new__(PageProcess)
+    monkeypatch.setattr(page, "_say", said.append)
+    monkeypatch.chdir(tmp_path)
+    journal = Path("live.journal")
+    for _ in range(2):  # the second time there is none
+        page.begin(experiment, journal)
+        assert not journal.exists()
+        journal.write_text("of an earlier loop")
+    page.begin(experiment, journal)
+    assert not journal.exists()
+    assert {each["journal"] for each in said} == {str(tmp_path / journal)}
+    assert {each["period"] for each in said} == {live_period(experiment)}
 
 
 def test_a_page_that_dies_before_its_key_was_held(

@@ -207,6 +207,8 @@ def test_the_picture_follows_the_journal(steered: Steered) -> None:
     (passed,) = loop_side.receive()
     assert json.dumps(passed)
     assert passed["position"] == [0.3, 0.3, 0.3]
+    ball = mirror.handles.obstacles["ball"]  # its zone follows it here
+    assert ball.where(mirrored.state) == [0.3, 0.3, 0.3]
     loop_side.close()
     heard.close()
 
