@@ -123,3 +123,25 @@ def test_the_command_names_missing_arguments(
     reported = capsys.readouterr().err
     assert re.search(wording("hsp: ... one run ... 2 logs ... --html"), reported)
     assert not (tmp_path / "a.gif").exists()
+
+
+def test_the_command_s_options_are_those_of_the_film(
+    planar: Rollout, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    styles = list[FilmStyle]()
+
+    def export(_: Rollout, path: Path, *, style: FilmStyle, **__: object) -> Path:
+        styles.append(style)
+        path.touch()
+        return path
+
+    monkeypatch.setattr(film, "export_film", export)
+    log = str(planar.save(tmp_path / "run.npz"))
+    command = ["export", log, f"--gif={tmp_path / 'a.gif'}"]
+    assert main(command) == 0
+    own = ["--size=320x240", "--fps=5", "--speed=2", "--from=1", "--to=2"]
+    assert main([*command, *own, "--no-plots"]) == 0
+    assert main([*command, *own, "--no-caption"]) == 0
+    some = FilmStyle((320, 240), 5.0, 2.0, start=1.0, end=2.0)
+    without = some._replace(plots=False), some._replace(caption=False)
+    assert styles == [FilmStyle(), *without]

@@ -140,6 +140,19 @@ def test_a_mass_matrix_that_is_nearly_singular(look: Look) -> None:
     assert "condition number of M reaches" in found.message
 
 
+def test_the_inertia_at_a_joint_is_what_a_motor_there_feels(
+    look: Look, tmp_path: Path
+) -> None:
+    """With the other joints free: the Schur complement of M at home."""
+    light = ARM.replace('value="2"', 'value="2e-4"').replace('="0.1"', '="1e-5"')
+    (found,) = look(light.replace('value="2e-4"', 'value="2"', 1))["rotors"]
+    robot = Robot.load(tmp_path / "arm.urdf")
+    M = robot.state(0.0, robot.home(), np.zeros(2)).mass_matrix
+    felt = M[1, 1] - M[0, 1] ** 2 / M[0, 0]
+    assert found.element == "joint 'elbow'"
+    assert f"at home the inertia at this joint is {felt:.1g} kg m²" in found.message
+
+
 def test_motors_that_cannot_hold_the_robot_at_home(look: Look, tmp_path: Path) -> None:
     """The effort against gravity is the gradient of the potential energy."""
     assert "effort" not in look(ARM)

@@ -31,7 +31,7 @@ from hsp_control import (
     Rollout,
     simulate,
 )
-from hsp_control.companions.plots import figures, log_series, palette, world
+from hsp_control.companions.plots import figures, log_series, palette, paths, world
 from hsp_control.companions.plots.curves import draw_lines
 from hsp_control.companions.plots.frames import draw_frame
 from hsp_control.companions.plots.log_series import decay_power, predicted_decay
@@ -310,6 +310,19 @@ def test_a_limit_is_drawn_within_a_fifth_of_the_joint_s_range(
     axes = drawn(draw_lines, np.arange(3.0), values, ["elbow"], ["rad"], limits)
     _, *limit_lines = axes.lines
     assert [float(line.get_ydata()[0]) for line in limit_lines] == edges
+
+
+@pytest.mark.parametrize(("axes", "view", "label"), [
+    ("xyz", world.oblique(), "desired"),
+    ("xz", world.oblique(), "desired (xz)"),
+    ("xz", world.plane("xz"), "desired"),
+    ("x", world.plane("xy"), "desired (x)"),
+    ("xyz", world.plane("xy"), "desired"),
+])  # fmt: skip
+def test_a_desired_path_names_its_axes_where_others_are_shown(
+    axes: str, view: world.View, label: str
+) -> None:
+    assert paths._desired_label(axes, view) == label
 
 
 # --- the prediction of e_N -----------------------------------------------------------
