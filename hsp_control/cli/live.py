@@ -15,6 +15,7 @@ from hsp_control.cli.live_experiment import (
     begun_where_it_is,
     check_live,
     live_period,
+    loaded_live,
     simulated_robot,
 )
 from hsp_control.cli.loading import read
@@ -22,7 +23,6 @@ from hsp_control.cli.robot_process import RobotProcess
 from hsp_control.cli.true_run import with_tasks
 from hsp_control.common.errors import LiveError, LogError
 from hsp_control.config import Experiment, load_experiment
-from hsp_control.config.loaded_scenario import load_scenario
 from hsp_control.control.compensation import CompensatedController
 from hsp_control.live import (
     Faults,
@@ -48,7 +48,7 @@ _DRY_RUN_OF_A_PLAN = 3.0  # the same with a plan, which must make its first step
 def live(options: argparse.Namespace) -> int:
     """Run a loop in real time, print its response times and why it ended."""
     faults = Faults.parse(options.faults)
-    loaded = load_scenario(read(options)).from_zero()
+    loaded = loaded_live(read(options))
     simulation = loaded.scenario.simulation
     duration = simulation.duration if options.duration is None else options.duration
     if not duration > 0.0:

@@ -5,6 +5,7 @@ A live run begins at the robot's configuration, not at that of the file.
 
 import argparse
 from dataclasses import replace
+from math import isclose
 
 import numpy as np
 
@@ -13,7 +14,7 @@ from hsp_control.common.arrays import Array
 from hsp_control.common.errors import HardwareError
 from hsp_control.config import Experiment
 from hsp_control.config.document import Document
-from hsp_control.config.loaded_scenario import load_scenario
+from hsp_control.config.loaded_scenario import LoadedScenario, load_scenario
 from hsp_control.config.streams import deaf
 from hsp_control.declaration import within
 from hsp_control.live import SimulatedRobot
@@ -24,15 +25,34 @@ FINAL_HOLD = 0.5
 """Time for which a simulated robot is held after its stop, before it ends [s]."""
 
 
+_PERIOD = 0.001
+"""Period of a live run of a configuration without a control period [s]."""
+
+
+def loaded_live(document: Document) -> LoadedScenario:
+    """Return a configuration as a live run follows it, and its log repeats it.
+
+    It begins at t = 0, and efforts are held, for a millisecond by default; the log says
+    so if its rows are whole multiples of that apart, as they must be in a simulation.
+    """
+    loaded = load_scenario(document).from_zero()
+    settings = loaded.scenario.simulation
+    rows = settings.log_period / _PERIOD
+    whole = isclose(rows, max(round(rows), 1), rel_tol=1e-6)
+    if settings.control_period is None and whole:
+        settings = replace(settings, control_period=_PERIOD)
+    return loaded._replace(scenario=replace(loaded.scenario, simulation=settings))
+
+
 def of_a_robot(document: Document) -> Experiment:
     """Return the experiment of a robot, whose loop receives the streams."""
-    loaded = load_scenario(document).from_zero()
+    loaded = loaded_live(document)
     return Experiment.of(loaded._replace(scenario=deaf(loaded.scenario)))
 
 
 def live_period(experiment: Experiment) -> float:
     """Return the period of a live run [s]: the control period, or a millisecond."""
-    return experiment.scenario.simulation.control_period or 0.001
+    return experiment.scenario.simulation.control_period or _PERIOD
 
 
 def check_live(experiment: Experiment) -> None:
@@ -79,4 +99,4 @@ def begun_where_it_is(
             f"configuration's start; {_FARTHEST:g} is allowed. Move the robot there, "
             f"or begin where it is, after a rehearsal: --set '{start}'"
         )
-    return Experiment.of(load_scenario(read(options, start)).from_zero())
+    return Experiment.of(loaded_live(read(options, start)))

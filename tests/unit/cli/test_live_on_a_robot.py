@@ -8,7 +8,8 @@ import pytest
 
 from hsp_control import Robot, Rollout, load_experiment
 from hsp_control.cli import main
-from hsp_control.cli.live_experiment import simulated_robot
+from hsp_control.cli.live_experiment import loaded_live, simulated_robot
+from hsp_control.config.document import read_document
 from hsp_control.live import InProcessRobot
 from hsp_control.live import hardware as live_hardware
 from hsp_control.live.hardware import AdaptingHardware, LocatedHardware
@@ -94,6 +95,20 @@ def test_a_live_run_begins_at_0_and_so_does_its_repetition(
     np.testing.assert_allclose(
         again[name][running], run[name][: running.sum()], atol=1e-9
     )
+
+
+@pytest.mark.parametrize(
+    ("log_period", "control_period"), [(0.01, 0.001), (0.0025, None), (0.0002, None)]
+)
+def test_a_live_log_says_for_how_long_efforts_are_held(
+    log_period: float, control_period: float | None
+) -> None:
+    """A log whose rows are no multiple apart could not be read again."""
+    document = read_document("paper/4_moving_obstacle")
+    document.override(f"simulation.log_period={log_period}")
+    settings = loaded_live(document).scenario.simulation
+    assert settings.control_period == control_period
+    assert settings.log_period == log_period
 
 
 @pytest.mark.system
