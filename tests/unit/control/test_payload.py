@@ -22,10 +22,10 @@ from hsp_control.control.compensation import (
     Predictor,
 )
 from hsp_control.control.first_state import StartWarning
+from hsp_control.live.dead_reckoning import DeadReckoning
 from hsp_control.live.loop import run_loop
 from hsp_control.live.settings import LiveSettings
 from hsp_control.live.simulated_robot import InProcessRobot
-from hsp_control.live.state_reader import DeadReckoning
 from hsp_control.live.still_sensors import StillSensors
 from hsp_control.live.trusted_motion import TrustedMotion
 from hsp_control.null_space.metrics import IdentityMetric, MassMatrixMetric, Metric

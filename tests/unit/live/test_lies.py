@@ -26,7 +26,7 @@ from hsp_control.live import (
 )
 from hsp_control.live.reaction_check import ReactionCheck
 from hsp_control.live.response_check import ResponseCheck
-from hsp_control.live.state_reader import RobotClock
+from hsp_control.live.robot_clock import RobotClock
 from hsp_control.live.still_sensors import StillSensors
 from hsp_control.live.trusted_motion import TrustedMotion
 from hsp_control.live.velocity_check import VelocityCheck

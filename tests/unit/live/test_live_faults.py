@@ -46,8 +46,9 @@ from hsp_control.live import (
     StopSettings,
     run_loop,
 )
+from hsp_control.live.frozen_state import FrozenState
 from hsp_control.live.loop import LiveRun
-from hsp_control.live.state_reader import FrozenState, MeasurementMonitor
+from hsp_control.live.measurement_monitor import MeasurementMonitor
 from hsp_control.robot import RobotState
 from hsp_control.trajectories.trajectory import TrajectorySample
 

@@ -10,8 +10,8 @@ from loaded_robots import panda
 from hsp_control import engine
 from hsp_control.common.arrays import Array
 from hsp_control.live import LiveSettings, Phase, SafeStop, StopSettings
+from hsp_control.live.dead_reckoning import DeadReckoning
 from hsp_control.live.report import Deadlines
-from hsp_control.live.state_reader import DeadReckoning
 from hsp_control.robot.integrators import Rk4
 from hsp_control.simulation.plants import IntegratedPlant, RigidBodyPlant
 from hsp_control.simulation.plants.model_changes import Inertias, changed

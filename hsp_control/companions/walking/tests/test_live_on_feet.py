@@ -33,8 +33,8 @@ from hsp_control.live import (
     run_loop,
 )
 from hsp_control.live.safe_stop import SafeStop, StandingFeet
-from hsp_control.live.state_reader import valid_measurement
 from hsp_control.live.udp import SensorLayout
+from hsp_control.live.valid_measurement import valid_measurement
 
 pytest.importorskip("example_robot_data")
 pytest.importorskip("mujoco")
