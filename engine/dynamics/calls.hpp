@@ -23,8 +23,10 @@ inline void check_sizes(const Dynamics& robot, Index q, Index v) {
                               std::to_string(robot.size()));
 }
 
-// Pinocchio's CRBA allocates for planar joints, and for screws about any axis (seen with 4.1).
-using MayAllocate = Allocation;
+// Permits that Pinocchio allocates, for a robot for which it does.
+struct PinocchioAllocates : Allocation {
+  explicit PinocchioAllocates(const Dynamics& robot) : Allocation(robot.allocates()) {}
+};
 
 struct Carry {
   static constexpr const char* doc =
@@ -113,7 +115,10 @@ struct JointJacobians {
                                   " columns and " + std::to_string(dynamics->joints()) +
                                   " joints, the world included");
   }
-  void operator()() { dynamics->joint_jacobians(q, v, jacobian, jacobian_dot, placements); }
+  void operator()() {
+    [[maybe_unused]] const PinocchioAllocates permitted(*dynamics.object);
+    dynamics->joint_jacobians(q, v, jacobian, jacobian_dot, placements);
+  }
 };
 
 struct Difference {
@@ -134,7 +139,10 @@ struct InverseDynamics {
   Out<'n'> effort;
 
   void check() const { check_sizes(*dynamics.object, q.size(), v.size()); }
-  void operator()() { dynamics->inverse_dynamics(q, v, acceleration, effort); }
+  void operator()() {
+    [[maybe_unused]] const PinocchioAllocates permitted(*dynamics.object);
+    dynamics->inverse_dynamics(q, v, acceleration, effort);
+  }
 };
 
 struct ForwardDynamics {
@@ -146,7 +154,7 @@ struct ForwardDynamics {
 
   void check() const { check_sizes(*dynamics.object, q.size(), v.size()); }
   void operator()() {
-    [[maybe_unused]] const MayAllocate crba(true);
+    [[maybe_unused]] const PinocchioAllocates permitted(*dynamics.object);
     if (!dynamics->forward_dynamics(q, v, effort, acceleration))
       acceleration.setConstant(std::numeric_limits<double>::quiet_NaN());
   }
@@ -160,7 +168,7 @@ struct MassMatrix {
 
   void check() const { check_sizes(*dynamics.object, q.size(), M.rows()); }
   void operator()() {
-    [[maybe_unused]] const MayAllocate crba(true);
+    [[maybe_unused]] const PinocchioAllocates permitted(*dynamics.object);
     dynamics->mass_matrix(q, M);
   }
 };
@@ -173,7 +181,10 @@ struct MassMatrixRate {
   Out<'n', 'n'> M_dot;
 
   void check() const { check_sizes(*dynamics.object, q.size(), v.size()); }
-  void operator()() { dynamics->mass_matrix_rate(q, v, M_dot); }
+  void operator()() {
+    [[maybe_unused]] const PinocchioAllocates permitted(*dynamics.object);
+    dynamics->mass_matrix_rate(q, v, M_dot);
+  }
 };
 
 // The centroidal map A gives momentum and angular momentum about the centre of mass c, A v.
@@ -198,6 +209,7 @@ struct CentroidalMotion {
 
   void check() const { check_sizes(*dynamics.object, q.size(), v.size()); }
   void operator()() {
+    [[maybe_unused]] const PinocchioAllocates permitted(*dynamics.object);
     Vector3 c;
     const MassFlow flow =
         dynamics->centroidal_map(q, v, c, {A.data(), 6, A.cols()}, {A_dot.data(), 6, A.cols()});

@@ -66,6 +66,9 @@ class Dynamics {
   Index size() const;                // v's
   Index columns() const;             // of the Jacobian of all joints, followers included
   Index joints() const;              // with the world
+  // Whether Pinocchio's algorithms allocate: for planar joints, screws about any axis, and joints in
+  // series as one (seen with 4.1).
+  bool allocates() const;
 
   // Set the payloads, in addition to the model's bodies; at most as many as `make_room` reserves.
   void make_room(Index bodies);

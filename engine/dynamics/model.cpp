@@ -110,7 +110,11 @@ Model model_of(const std::vector<Joint>& joints, const Vector3& gravity, const V
 }  // namespace
 
 Dynamics::Dynamics(const std::vector<Joint>& joints, const Vector3& gravity, const Vector& armature)
-    : pinocchio_(new Pinocchio(model_of(joints, gravity, armature))) {}
+    : pinocchio_(new Pinocchio(model_of(joints, gravity, armature))) {
+  for (const Joint& each : joints)
+    pinocchio_->allocates |= each.type == "JointModelPlanar" || each.type == "JointModelHelical" ||
+                             each.type == "JointModelComposite";
+}
 
 void Dynamics::make_room(Index bodies) {
   pinocchio_->carried.reserve(static_cast<std::size_t>(bodies));
@@ -162,5 +166,6 @@ Index Dynamics::configuration_size() const { return pinocchio_->model.nq; }
 Index Dynamics::size() const { return pinocchio_->model.nv; }
 Index Dynamics::columns() const { return pinocchio_->model.nvExtended; }
 Index Dynamics::joints() const { return pinocchio_->model.njoints; }
+bool Dynamics::allocates() const { return pinocchio_->allocates; }
 
 }  // namespace hsp

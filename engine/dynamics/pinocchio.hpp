@@ -53,6 +53,7 @@ struct Dynamics::Pinocchio {
   std::vector<Carried> carried;
   Data::Matrix6x momenta, momentum_rates;  // of the Jacobian's columns, at the world's origin
   Vector zero;                             // of v's size
+  bool allocates = false;                  // see Dynamics
   Eigen::LLT<Eigen::MatrixXd> factor;      // of M, of models with followers
 
   // Data is made where it stays: its factorisations may not be copied before they are made.
