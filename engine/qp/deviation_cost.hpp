@@ -253,12 +253,11 @@ struct Directions {
     T_d *= slack[0];
     T_d.diagonal().array() += other;
     auto q = FG.col(0).head(rest.rows());
-    Index k = 0;
-    for (Index r = 0; r < exact.Q.rows(); ++r) {
-      while (r >= ends[k]) ++k;
-      q.noalias() = rest * exact.Q.row(r).transpose();
-      T_d.noalias() += other * (costs.t[k] - 1.0) * q * q.transpose();
-    }
+    for (Index k = 0, r = 0; k < ends.size(); ++k)
+      for (; r < ends[k]; ++r) {
+        q.noalias() = rest * exact.Q.row(r).transpose();
+        T_d.noalias() += other * (costs.t[k] - 1.0) * q * q.transpose();
+      }
   }
 
   // Complete the first directions to an orthonormal basis, with the null space.
