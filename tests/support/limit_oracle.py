@@ -15,7 +15,6 @@ from hsp_control.control.actuation.support import Support
 from hsp_control.edge import BoundLaw
 
 _EQUALITY, _INEQUALITY = 5, 0
-_FORCE_COST = 1e-6
 
 
 class Rows(NamedTuple):
@@ -146,7 +145,7 @@ def limited_step(
     n, p = len(a), support.size
     H = np.zeros((n + p, n + p))
     H[:n, :n] = deviation_cost(law, p > 0, size, costs, slack)
-    cost = _FORCE_COST / np.maximum(support.inverse_cost, 1e-6)
+    cost = (1e-6 if len(base) else 1e-14) / np.maximum(support.inverse_cost, 1e-6)
     H[range(n, n + p), range(n, n + p)] = cost
     f = np.zeros(n + p)
     f[n:] = -cost * support.forces / weight

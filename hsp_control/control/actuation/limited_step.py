@@ -62,9 +62,16 @@ EXACT, LIMITED, RELAXED = Status.EXACT, Status.LIMITED, Status.RELAXED
 BEYOND = Status.BEYOND
 """For the step: up to Python 3.11 `Status.EXACT` takes 80 ns."""
 
-_FORCE_COST = 1e-6
-"""Cost of squared forces, in robot weights, relative to accelerations. It makes the
-forces unique, and is small beside the cost of any deviation."""
+
+def _force_cost(unactuated: int) -> float:
+    """Return the cost of squared forces, in robot weights, relative to accelerations.
+
+    It makes the forces unique. With a fixed base commanded ones, too, cost a hundredth
+    of the null space's least, so that the effort is continuous where forces alone cease
+    to keep the limits. With a floating base rounding does not permit that: there
+    commanded ones cost more than the null space.
+    """
+    return 1e-6 if unactuated else 1e-14
 
 
 class QPOutcome(NamedTuple):
@@ -266,7 +273,7 @@ class LimitedStep:
             PartCall(engine.LimitedRows, **around, A=A, lower=lower, upper=upper)
         )
         write = write_directions(levels, directions)
-        start = begin_with(_FORCE_COST, self._rows.own)
+        start = begin_with(_force_cost(len(base)), self._rows.own)
         within = optimum(self._rows, moving, memories[0], LIMITED, outcome)
         closest = [write, root(standing=p > 0), start, *within]
         # Without a feasible step: soft rows, also those of contacts.

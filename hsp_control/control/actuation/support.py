@@ -220,8 +220,9 @@ def _supporting_dofs(robot: Robot, contacts: Sequence[Contact]) -> Indices:
 
 COMMANDED_INVERSE_COST = 1e-6
 """ε: cost of squared deviations of free forces relative to those of commanded ones.
-With 1 kN on the feet a commanded force then deviates by 1 mN. In a limited step an
-error of the command costs more than null-space motion, and less than task errors."""
+With 1 kN on the feet a commanded force then deviates by 1 mN. In a limited step of a
+floating base an error of the command costs more than null-space motion, and less than
+task errors."""
 
 
 def _write_weight(t: float, contact: PlannedContact, out: Array) -> None:

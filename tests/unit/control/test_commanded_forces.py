@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from loaded_robots import panda, talos
+from loaded_robots import load, panda, talos
 from places import further
 from runs import check_null_space, continuous
 from wording import wording
@@ -319,3 +319,56 @@ def test_changes_that_do_not_fit() -> None:
         change.force(TIP, CommandedForce(-1.0))
     with pytest.raises(ContactError, match="has no commanded force from the start"):
         pressing(PointContact(TIP)).at(1.0).force(TIP, CommandedForce(10.0))
+
+
+# --- where efforts are scarce --------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("arm", "seed"), [("iiwa14", 28), *further(("iiwa14", 3), ("ur5", 15), ("ur5", 24))]
+)
+def test_the_effort_is_continuous_where_forces_cease_to_suffice(
+    arm: str, seed: int
+) -> None:
+    """A gain grows until no force of a wiper lets its arm accelerate as the law says.
+
+    Up to there the wiper is pressed with up to ten times its command.
+    """
+    robot, rng = load(arm), np.random.default_rng(seed)
+    n = robot.nv
+    q = robot.integrate(robot.home(), 0.3 * rng.standard_normal(n))
+    v = 0.2 * rng.standard_normal(n)
+    held = np.abs(robot.state(0.0, q, np.zeros(n)).nonlinear_effects)
+    effort = (0.6 + rng.uniform(0.0, 1.0, n)) * held + 2.0
+    hand, force = robot.end_effector, CommandedForce(5.0)
+    made = hsp.Controller(
+        robot,
+        [hsp.FramePosition(hand, axes="xy", name="hand")],
+        hsp.TargetPosture("home"),
+        null_space_gain=1.0,
+        limits=hsp.Limits(
+            effort=effort, velocity="none", position="none", static_effort="none"
+        ),
+        contacts=[hsp.contacts.SlidingContact(hand, friction=0.3, force=force)],
+        start=q,
+    )
+    made.at(0.1).ramp(0.5).null_space_gain(15.0)
+    found = set[Status]()
+
+    def tau(t: float) -> Array:
+        out = made.compute(robot.state(t, q, v))
+        found.add(out.status)
+        return out.tau
+
+    times = np.linspace(0.1, 0.6, 101)
+    steps = np.abs(np.diff([tau(t) for t in times], axis=0)).max(axis=1)
+    k = int(steps.argmax())
+    before, after = times[k], times[k + 1]
+    while after - before > 1e-9:
+        middle = 0.5 * (before + after)
+        first, half, last = map(tau, (before, middle, after))
+        left = np.abs(half - first).max() >= np.abs(last - half).max()
+        before, after = (before, middle) if left else (middle, after)
+    assert {Status.REDISTRIBUTED, Status.LIMITED} <= found
+    # 100 N·m/s in a nanosecond, and 1e-6
+    assert np.abs(tau(after) - tau(before)).max() < 1.1e-6
