@@ -30,6 +30,8 @@ CHECKS = {
     "os.execv(find_ruff_bin(), ['ruff', 'check', '--quiet'])",
     "tests": "import pytest, sys; run = lambda: "
     "sys.exit(pytest.main(['--collect-only', '-q', '-p', 'no:randomly']))",
+    "links": "import pytest, sys; run = lambda: "
+    "sys.exit(pytest.main(['tests/unit/test_links.py', '-q', '-n0']))",
 }
 
 

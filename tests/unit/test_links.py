@@ -7,6 +7,7 @@ Links between pages of the site are checked when it is built, those to other sit
 import json
 import os
 import re
+import sys
 from pathlib import Path
 
 import pytest
@@ -17,7 +18,7 @@ PATTERNS = (
     "hsp_control/companions/**/*.md",
 )
 COMPANIONS = ROOT / "hsp_control" / "companions"
-PACKAGE = (ROOT / "hsp_control" / "__init__.py").read_text(encoding="utf-8")
+PACKAGE = (ROOT / "hsp_control" / "__init__.pyi").read_text(encoding="utf-8")
 BUILT = ("_build", "generated")
 LINK = re.compile(r"\]\(([^)\s]+)\)|^\[[^\]]+\]: (\S+)|<img src=\"([^\"]+)\"", re.M)
 CODE = re.compile(r"^(```|~~~|::::?).*?^\1|`[^`\n]+`", re.M | re.S)
@@ -60,6 +61,16 @@ def test_no_document_links_to_a_file_that_is_not_there(file: Path) -> None:
         cells = [cell for cell in json.loads(text)["cells"] if "outputs" not in cell]
         text = "\n\n".join("".join(cell["source"]) for cell in cells)
     assert missing(text, file.parent) == []
+
+
+def test_a_companion_that_is_taken_away_is_known(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sys.modules[__name__], "COMPANIONS", tmp_path)
+    (tmp_path / "rerun").mkdir()
+    assert taken_away(tmp_path / "film" / "page.md")
+    assert not taken_away(tmp_path / "rerun" / "page.md")
+    assert not taken_away(tmp_path / "flim" / "page.md")
 
 
 def test_a_missing_file_is_reported(tmp_path: Path) -> None:

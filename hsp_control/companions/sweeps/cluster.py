@@ -16,8 +16,12 @@ if TYPE_CHECKING:
 
 PATIENCE = 60.0
 """Maximum time for a scheduler to answer, and for the first worker to start [s]."""
+SILENCE = 60
+"""Time without an answer after which a worker of this computer is given up [s]."""
 KILLS = 3
 """Number of workers of this computer that a run may kill before it is abandoned."""
+
+_log = logging.getLogger(__name__)
 
 # Dask's command, in a process group that ends when this process does: the pipe to it
 # closes then, for any reason. Not Dask's own processes, which import the user's script
@@ -55,11 +59,28 @@ def connected(
                 yield client
             return
         try:
+            _check_address(scheduler)
             client = Client(scheduler, timeout=PATIENCE, set_as_default=False)
         except (OSError, ValueError) as error:  # also a time-out
             raise SweepError(f"no scheduler answers at {scheduler}: {error}") from None
         with _closing(client):
+            if not client.nthreads():
+                _log.warning("%s has no workers yet: the runs wait for them", scheduler)
             yield client
+
+
+def _check_address(scheduler: str) -> None:
+    """Raise a ValueError for what is no address: Dask's client would hang at its end.
+
+    It may be a name of Dask's, too, such as ``tls://host:8786`` or a file's address.
+    """
+    from distributed.comm import parse_address, parse_host_port
+    from distributed.comm.registry import get_backend
+
+    scheme, place = parse_address(scheduler)
+    get_backend(scheme)
+    if scheme in ("tcp", "tls"):
+        parse_host_port(place)
 
 
 @contextmanager
@@ -85,6 +106,8 @@ def _own_workers(workers: int | None) -> "Iterator[Client]":
         "distributed.scheduler.allowed-failures": KILLS - 1,
         # A worker has one run, so that its death is caused by that run.
         "distributed.scheduler.worker-saturation": 1.0,
+        # One that is stopped does not answer; its run is another's after twice that.
+        "distributed.scheduler.worker-ttl": f"{SILENCE} s",
     }
     with dask.config.set(settings):
         cluster = LocalCluster(

@@ -163,7 +163,7 @@ def _tint(axes: Axes, correlation: float, share: float, noise: float) -> None:
     words = [f"ρ {correlation:+.2f}"] if monotone else []
     words += [f"{share:.0%}"] if share >= 0.005 else []
     axes.set_title(
-        "  ".join(words) or "no influence",
+        "  ".join(words) or "may be chance",
         fontsize=9.0,
         fontweight="normal" if share < 0.1 else "bold",
         color=palette.INK if words else palette.MUTED,
@@ -233,7 +233,7 @@ def _medians(x: Array, y: Array) -> tuple[Array, Array]:
 def _add_title(figure: Figure, sweep: Sweep) -> None:
     identity = sweep.meta["identity"]
     named = identity["configuration"].get("title") or Path(sweep.meta["name"]).stem
-    letters = round(12.5 * figure.get_figwidth()) + 5
+    letters = round(9.5 * figure.get_figwidth())
     figure.suptitle(literal_text(textwrap.fill(str(named), letters)))
 
 

@@ -149,10 +149,14 @@ class RowFiles:
                 )
 
     def add(self, row: Row) -> None:
-        """Add a row; it is in a file `SECONDS` later at the latest, or when closed."""
+        """Add a row; see `write_if_due`."""
         self._new.append(row)
         self.done.add(row.run)
         self.failures += row.status != "completed"
+        self.write_if_due()
+
+    def write_if_due(self) -> None:
+        """Write the rows that are only in memory if they have been for `SECONDS`."""
         if monotonic() - self._written > SECONDS:
             self.write()
 

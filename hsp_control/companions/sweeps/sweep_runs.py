@@ -6,6 +6,7 @@ from itertools import islice
 from os import PathLike
 from pathlib import Path
 from threading import Thread
+from time import sleep
 from typing import TYPE_CHECKING, Any
 
 from hsp_control.common.errors import SweepError
@@ -25,6 +26,9 @@ if TYPE_CHECKING:
     from hsp_control.companions.sweeps.one_run import Row
     from hsp_control.companions.sweeps.row_files import RowFiles
 
+_POLL = 0.02
+"""Time between two looks for completed runs [s]."""
+_LOST = "the scheduler does not answer any more; the same command resumes the sweep"
 AT_ONCE = 1000
 """Runs submitted to the scheduler at a time: 10^5 would take a minute, and much
 memory."""
@@ -130,6 +134,9 @@ def sweep(
                     if on_start is not None:
                         on_start(client)
                     for row in _computed(plan, packed, rows, client, time_limit):
+                        if row is None:
+                            rows.write_if_due()
+                            continue
                         rows.add(row)
                         tell(len(rows.done), len(plan), rows.failures)
     finally:
@@ -189,8 +196,8 @@ def _computed(
     rows: "RowFiles",
     client: "Client",
     time_limit: float | None,
-) -> "Iterator[Row]":
-    """Yield the rows of the remaining runs, as they end."""
+) -> "Iterator[Row | None]":
+    """Yield the rows of the remaining runs, as they end; None while none has ended."""
     from distributed import as_completed
 
     from hsp_control.companions.sweeps.one_run import one_run
@@ -213,8 +220,12 @@ def _computed(
         submitted(AT_ONCE), loop=client.loop, with_results=True, raise_errors=False
     )
     try:
-        for future, result in waiting:
-            yield _row(future, result)
+        while not waiting.is_empty():
+            if not waiting.has_ready():
+                sleep(_POLL)
+                yield None
+                continue
+            yield _row(*next(waiting))
             waiting.update(submitted(1))
     finally:
         for future in list(waiting.futures):
@@ -238,6 +249,8 @@ def _give(client: "Client", packed: "Luggage") -> None:
     giving = Thread(target=give, daemon=True)
     giving.start()
     giving.join(10.0)
+    if failed and isinstance(failed[0], OSError):  # also of Dask, for a lost scheduler
+        raise SweepError(_LOST)
     if failed:
         raise SweepError(f"a worker cannot be prepared: {failed[0]}")
 
@@ -256,9 +269,7 @@ def _row(future: Any, result: Any) -> "Row":
     if isinstance(result, Row):
         return result  # whatever has become of its worker since then
     if future.status in ("cancelled", "lost"):
-        raise SweepError(
-            "the scheduler does not answer any more; the same command resumes the sweep"
-        )
+        raise SweepError(_LOST)
     _, error, _ = result
     if isinstance(error, KilledWorker):
         died = error.allowed_failures + 1

@@ -368,7 +368,7 @@ def test_every_pair_has_its_panel_and_failures_are_shown() -> None:
     tints = [np.array(each.get_facecolor()) for each in axes]
     assert tints[0][2] > tints[0][0]  # grows: blue
     assert tints[4][0] > tints[4][2]  # falls: orange
-    assert axes[2].get_title(loc="left") == "no influence"
+    assert axes[2].get_title(loc="left") == "may be chance"
 
 
 def test_a_figure_shows_the_parameters_that_are_named_as_wide_as_a_paper_needs() -> (
