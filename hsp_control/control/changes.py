@@ -1,7 +1,7 @@
 """Changes of a controller while it runs: events on one time line."""
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from itertools import takewhile
 from numbers import Real
@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hsp_control.common.entry_points import own_names
-from hsp_control.common.errors import ControllerError, HspControlError
+from hsp_control.common.errors import ControllerError, GainError, HspControlError
 from hsp_control.common.keywords import suggesting_methods
 from hsp_control.common.suggestions import did_you_mean
 from hsp_control.constraints.contacts import CommandedForce
@@ -42,6 +42,8 @@ from hsp_control.declaration.rotation import AnyRotation
 from hsp_control.geometry.scene import Start
 from hsp_control.null_space.fields import NullSpaceField
 from hsp_control.tasks import Gains, Impedance, Task
+from hsp_control.tasks.compliant_task import impedance_of
+from hsp_control.tasks.gains import check_decay
 from hsp_control.trajectories import Trajectory
 from hsp_control.trajectories.crossfade import AnyReference
 from hsp_control.trajectories.pose import AnyPose
@@ -282,8 +284,16 @@ def _checked(change: Change, setup: Setup) -> Setup:
         raise ControllerError(
             f"{name} replaces the metric, which has no ramp: build another controller"
         )
+    for slot in fields(setup):
+        old, new = getattr(setup, slot.name), getattr(after, slot.name)
+        if type(new) is not type(old):
+            raise ControllerError(
+                f"{name} replaces {slot.name} by {type(new).__name__}; needs "
+                f"{type(old).__name__}, such as what `then` returns"
+            )
     if after.gain is not setup.gain:
         checked_gain(after.gain.target, after.start.state.robot, after.metric)
+    before = {id(task.gains) for task in setup.tasks}
     for task in after.tasks:
         found, needed = np.shape(task.gains.target), np.shape(task.gains.initial)
         if found != needed:
@@ -291,6 +301,16 @@ def _checked(change: Change, setup: Setup) -> Setup:
                 f"{name} changes the gains of task {task.task.name!r} to an array of "
                 f"shape {found}; needs {needed}, that of Task.in_force().numbers"
             )
+        if id(task.gains) in before:
+            continue
+        target, of = task.gains.target, f"{name}, task {task.task.name!r}"
+        if not np.isfinite(target).all():
+            raise GainError(f"{of}: the gains contain NaN or inf")
+        if impedance_of(task.task) is None:
+            try:
+                check_decay(*target)
+            except GainError as error:
+                raise GainError(f"{of}: {error.bare_message}") from None
     return after
 
 

@@ -97,7 +97,14 @@ def _target_of(task: Task, value: object, here: Callable[[], RobotState]) -> Arr
     followed = task.followed
     if isinstance(task, Pointing):
         direction = numbers(value)
-        if direction is not None and direction.shape == (3,) and direction.any():
+        if direction is not None and direction.shape == (3,):
+            with np.errstate(over="ignore"):
+                length = np.linalg.norm(direction)
+            if not 0.0 < length < np.inf:
+                raise ControllerError(
+                    f"a target of task {task.name!r}: the direction is "
+                    f"{direction.tolist()}; must be non-zero and finite"
+                )
             return np.array(pin.Quaternion(task.facing(direction, here())).coeffs())
     if isinstance(followed, PoseTrajectory):
         needed = "a pin.SE3, x, y, z and a quaternion (x, y, z, w), or a 4 × 4 matrix"

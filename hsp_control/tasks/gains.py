@@ -73,14 +73,19 @@ class Gains(Part, error=GainError):
                 )
         Kp = as_matrix(kp, rows, "kp")
         Kv = as_matrix(kv, rows, "kv")
-        companion = np.block([[np.zeros((rows, rows)), np.eye(rows)], [-Kp, -Kv]])
-        slowest = float(np.linalg.eigvals(companion).real.max())
-        if slowest >= 0.0:
-            raise GainError(
-                "with these gains the error does not decay: e'' + Kv e' + Kp e = 0 has "
-                f"an eigenvalue with real part {slowest:.3g} 1/s; needs less than 0"
-            )
+        check_decay(Kp, Kv)
         return Kp, Kv
+
+
+def check_decay(Kp: Array, Kv: Array) -> None:
+    """Check that e'' + Kv e' + Kp e = 0 is stable, shapes (m, m)."""
+    zero, one = np.zeros_like(Kp), np.eye(len(Kp))
+    slowest = float(np.linalg.eigvals(np.block([[zero, one], [-Kp, -Kv]])).real.max())
+    if slowest >= 0.0:
+        raise GainError(
+            "with these gains the error does not decay: e'' + Kv e' + Kp e = 0 has "
+            f"an eigenvalue with real part {slowest:.3g} 1/s; needs less than 0"
+        )
 
 
 def as_matrix(gain: Array, size: int, name: str) -> Array:

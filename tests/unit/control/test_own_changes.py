@@ -54,9 +54,17 @@ class WrongShape(hsp.changes.Change):
         return setup.with_task(task, gains=gains)
 
 
+class Number5(hsp.changes.Change):
+    """K_N as a number."""
+
+    def apply(self, setup: Any) -> Any:
+        return replace(setup, gain=5.0)
+
+
 MISTAKES = {
     Forgetful: r"Forgetful\.apply returns NoneType; needs the changed Setup",
     OtherMetric: r"OtherMetric\.apply replaces the metric, which has no ramp",
+    Number5: r"Number5\.apply replaces gain by float; needs Evolution",
     WrongShape: r"gains of task 'hand' to an array of shape \(2, 8, 2\); needs \(2, 2",
 }
 
@@ -100,6 +108,26 @@ def test_a_mistake_is_one_error(kind: type[hsp.changes.Change], begun: bool) -> 
 def test_a_gain_that_lets_the_error_grow_is_refused() -> None:
     with pytest.raises(hsp.errors.GainError, match="null_space_gain"):
         controller().change(Calm(-1.0, at=1.0))
+
+
+@pytest.mark.parametrize(
+    ("factor", "message"), [(np.nan, "contain NaN"), (-1.0, "does not decay")]
+)
+def test_gains_with_which_no_error_decays_are_refused(
+    factor: float, message: str
+) -> None:
+    class Scaled(hsp.changes.Change):
+        def apply(self, setup: Any) -> Any:
+            (task,) = setup.tasks
+            target = factor * np.asarray(task.gains.target)
+            return setup.with_task(
+                task, gains=task.gains.then(self.at, self.ramp, target)
+            )
+
+    with pytest.raises(
+        hsp.errors.GainError, match=f"Scaled.apply, task 'hand': .*{message}"
+    ):
+        controller(Scaled(at=1.0))
 
 
 def test_another_kind_is_made_by_change() -> None:

@@ -33,6 +33,13 @@ def turned() -> hsp.Controller:
     return hsp.Controller(hsp.Robot.load("panda"), [hsp.FramePose("panda_hand")])
 
 
+def pointing() -> hsp.Controller:
+    eye = hsp.Pointing(direction=[0, 0, -1], name="eye")
+    made = hsp.Controller(hsp.Robot.load("panda"), [eye])
+    made.compute(0.0, made.robot.home(), np.zeros(7))
+    return made
+
+
 def still(c: hsp.Controller) -> InProcessRobot:
     """Return a robot at rest."""
     model, rk4 = hsp.plants.RigidBodyPlant(c.robot), hsp.integrators.Rk4(0.001)
@@ -95,6 +102,8 @@ def still(c: hsp.Controller) -> InProcessRobot:
     (lambda c: c.at(0.9).gains("panda_hand", hsp.Gains(natural_frequency=9.0))
         and c.at(0.5).remove("panda_hand"),
      ControllerError, "ChangeGains at t = 0.9 s would not fit .*'panda_hand'"),
+    (lambda c: pointing().set_target("eye", [0, 0, 0]),
+     ControllerError, r"direction is \[0.0, 0.0, 0.0\]; must be non-zero"),
     (lambda c: turned().set_target("panda_hand", [0.4, 0, 0.5, 2, 0, 0, 0]),
      ControllerError, "^a target of task 'panda_hand': rotation: .* norm 1; it has 2"),
 ])  # fmt: skip
