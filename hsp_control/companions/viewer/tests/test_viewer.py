@@ -194,6 +194,9 @@ def test_every_shape_of_obstacle_is_drawn(
     viewer.draw_scene(Rollout(columns, {**run.meta, "obstacles": {"it": about}}))
     again = geometries(recorder, "/obstacles/it")
     assert live
+    if isinstance(shape, shapes.HalfSpace):  # as large as the scene, or the whole run
+        assert [each["type"] for each in again] == [each["type"] for each in live]
+        return
     np.testing.assert_equal(nameless(again), nameless(live))
 
 
