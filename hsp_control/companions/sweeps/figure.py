@@ -135,6 +135,7 @@ def _draw_panel(axes: Axes, sweep: Sweep, found: Sensitivity, i: int, j: int) ->
     if _needs_log_axis(y[known]):
         axes.set_yscale("log")
         _label_decades(axes.yaxis, y[known])
+    _show_as_equal(axes, y[known])
     if (~chosen).any():  # at the lower edge, for any y axis
         axes.plot(
             x[~chosen],
@@ -149,6 +150,13 @@ def _draw_panel(axes: Axes, sweep: Sweep, found: Sensitivity, i: int, j: int) ->
         _tint(
             axes, float(found.correlation[i, j]), float(found.share[i, j]), found.noise
         )
+
+
+def _show_as_equal(axes: Axes, values: Array) -> None:
+    """Widen the y axis of values that differ by rounding: its labels would be long."""
+    largest = np.abs(values).max(initial=0.0)
+    if largest > 0.0 and np.ptp(values) < 1e-9 * largest:
+        axes.set_ylim(values[0] - 0.05 * largest, values[0] + 0.05 * largest)
 
 
 def _tint(axes: Axes, correlation: float, share: float, noise: float) -> None:

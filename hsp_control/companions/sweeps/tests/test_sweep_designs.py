@@ -371,6 +371,26 @@ def test_every_pair_has_its_panel_and_failures_are_shown() -> None:
     assert axes[2].get_title(loc="left") == "may be chance"
 
 
+def test_a_narrow_figure_has_its_whole_title_and_short_labels() -> None:
+    """Of one parameter, and of a result that changes by rounding alone."""
+    whole = invented()
+    name = next(iter(whole.meta["metrics"]))
+    equal = 0.04719859279 + 1e-16 * np.arange(len(whole))
+    columns = {**whole.columns, name: equal}
+    title = {"title": "Simulation 4: a moving disk to keep away from, of many words"}
+    identity = {**whole.meta["identity"], "configuration": title}
+    meta = {**whole.meta, "identity": identity}
+    figure = sweeps.sweep_figure(Sweep(columns, meta), parameters=["up"])
+    figure.canvas.draw()
+    assert figure._suptitle is not None
+    box = figure._suptitle.get_window_extent()
+    assert 0.0 <= box.x0 < box.x1 <= figure.bbox.width
+    rows = [axes for axes in figure.axes if np.ptp(axes.lines[0].get_ydata()) < 1e-9]
+    assert rows
+    for axes in rows:
+        assert max(len(label.get_text()) for label in axes.get_yticklabels()) < 8
+
+
 def test_a_figure_shows_the_parameters_that_are_named_as_wide_as_a_paper_needs() -> (
     None
 ):
