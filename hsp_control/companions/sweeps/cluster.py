@@ -70,10 +70,7 @@ def connected(
 
 
 def _check_address(scheduler: str) -> None:
-    """Raise a ValueError for what is no address: Dask's client would hang at its end.
-
-    It may be a name of Dask's, too, such as ``tls://host:8786`` or a file's address.
-    """
+    """Raise a ValueError for what is no address: Dask's client would hang at its end."""
     from distributed.comm import parse_address, parse_host_port
     from distributed.comm.registry import get_backend
 
