@@ -70,7 +70,7 @@ def connected(
 
 
 def _check_address(scheduler: str) -> None:
-    """Raise a ValueError for what is no address: Dask's client would hang at its end."""
+    """Raise a ValueError for what is no address: Dask's client would hang."""
     from distributed.comm import parse_address, parse_host_port
     from distributed.comm.registry import get_backend
 
