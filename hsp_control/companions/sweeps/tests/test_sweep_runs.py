@@ -24,7 +24,7 @@ from sweep_runs import MOVING, OVER, QUICK, SCHEDULER, WORKER, open_port
 
 import hsp_control as hsp
 from hsp_control.common.errors import ConfigError, HspControlError, SweepError
-from hsp_control.companions.sweeps import Sweep, cluster, sweep_runs
+from hsp_control.companions.sweeps import Sweep, cluster, row_files, sweep_runs
 from hsp_control.companions.sweeps.one_run import Row, computed
 from hsp_control.companions.sweeps.row_files import RowFiles, read_rows
 
@@ -559,6 +559,26 @@ def test_one_process_at_a_time(file: Path, swept: Sweep, tmp_path: Path) -> None
         hsp.sweeps.sweep(MOVING, OVER, overrides=QUICK, out=out)
     held.close()
     assert not out.exists()  # it had no rows
+
+
+def test_rows_are_written_while_no_other_one_ends(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A run that lasts long, or a worker that is stopped, keeps them in memory."""
+    plan: Any = type("Plan", (), {"__len__": lambda _: 2})()
+    plan.base, plan.factors, plan.points, plan.name = plan, (), (), ""
+    now = 0.0
+    monkeypatch.setattr(row_files, "monotonic", lambda: now)
+    out = tmp_path / "sweep.parquet"
+    files = RowFiles(plan, {}, out, fresh=False)
+    files.add(Row(0, "completed", "", {}, 0.1))
+    files.write_if_due()
+    assert not list(out.glob("*.parquet"))
+    now = row_files.SECONDS + 0.1
+    files.write_if_due()
+    rows, _ = read_rows(out)
+    assert rows["run"].to_pylist() == [0]
+    files.close()
 
 
 @pytest.mark.parametrize("later", [[1], []], ids=["more rows", "no more rows"])
