@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <hsp/indices.hpp>
 #include <hsp/kind.hpp>
 
@@ -10,63 +11,60 @@ namespace hsp {
 
 struct ChooseSets {
   static constexpr const char* doc =
-      "Which sets of parts a step resolves, and their shares: (1 - w₁), (w₁ - w₂), ... with the "
-      "presences w₁ ≥ w₂ ≥ ... between 0 and 1. Whether all of them are there; if not, none is on.";
-  In<'k'> presences;
+      "Which sets of parts a step resolves, and their shares: a part is active in its interval of "
+      "(0, 1), and a set's share is the length of where these parts are. Whether all of the sets are "
+      "there; if not, none is on.";
+  In<'k'> lows, highs;     // the intervals, empty where high <= low
   Ints<'s', 'k'> members;  // 1: the set has this part
   OutInts<'s'> on;
   Out<'s'> shares;
   static constexpr Index most = 64;
 
   void check() const {
-    if (presences.size() > most) throw std::invalid_argument("there may be 64 parts");
+    if (highs.size() > most) throw std::invalid_argument("there may be 64 parts");
   }
   bool operator()() {
-    std::array<Index, most> coming;
-    Index count = 0;
-    std::uint64_t set = 0;
-    for (Index k = 0; k < presences.size(); ++k) {
-      const double w = presences[k];
-      if (w >= 1.0) set |= bit(k);
-      else if (w > 0.0) {  // after those of the same presence
-        Index place = count++;
-        for (; place > 0 && presences[coming[place - 1]] < w; --place)
-          coming[place] = coming[place - 1];
-        coming[place] = k;
-      }
+    std::array<double, 2 * most + 2> ends{0.0, 1.0};
+    Index count = 2;
+    for (Index k = 0; k < highs.size(); ++k) {
+      if (highs[k] <= lows[k]) continue;
+      for (const double end : {lows[k], highs[k]})
+        if (0.0 < end && end < 1.0) ends[count++] = end;
     }
+    std::sort(ends.begin(), ends.begin() + count, std::greater<>());
     on.setZero();
     shares.setZero();
-    bool all = true;
-    double share = 1.0;
-    for (Index i = 0; i <= count; ++i) {
-      const double next = i < count ? presences[coming[i]] : 0.0;
-      if (share != next) {
-        const Index s = place_of(set);
-        all = all && s < on.size();
-        if (s < on.size()) {
-          on[s] = 1;
-          shares[s] = share - next;
-        }
+    for (Index i = 0; i + 1 < count; ++i) {
+      const double high = ends[i], low = ends[i + 1];
+      if (high == low) continue;
+      const Index s = place_of(active(low, high));
+      if (s == on.size()) {
+        on.setZero();
+        shares.setZero();
+        return false;
       }
-      share = next;
-      if (i < count) set |= bit(coming[i]);
+      on[s] = 1;
+      shares[s] += high - low;
     }
-    if (!all) {
-      on.setZero();
-      shares.setZero();
-    }
-    return all;
+    return true;
   }
 
  private:
   static std::uint64_t bit(Index k) { return std::uint64_t{1} << k; }
 
+  // The parts that are active between two ends.
+  std::uint64_t active(double low, double high) const {
+    std::uint64_t set = 0;
+    for (Index k = 0; k < highs.size(); ++k)
+      if (lows[k] <= low && high <= highs[k]) set |= bit(k);
+    return set;
+  }
+
   // Which of the sets has these parts; their number: none.
   Index place_of(std::uint64_t set) const {
     for (Index s = 0; s < on.size(); ++s) {
       std::uint64_t own = 0;
-      for (Index k = 0; k < presences.size(); ++k)
+      for (Index k = 0; k < highs.size(); ++k)
         if (members(s, k)) own |= bit(k);
       if (own == set) return s;
     }

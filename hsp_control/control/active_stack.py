@@ -1,6 +1,6 @@
 """The active stack: the law for the contacts and tasks active at one time."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from functools import cached_property, partial
 from itertools import chain
@@ -303,20 +303,53 @@ class ActiveStack:
         )
 
 
+def tasks_of(
+    resolved: Sequence[ActiveStack],
+) -> Iterator[tuple[str, ActiveStack, StackedTask]]:
+    """Yield each task of the stacks of a step once: its name, its stack, and its place.
+
+    The last stack is the active one; it has all tasks except those that others replace.
+    Stacks with fewer contacts are left out: theirs may begin where a contact ends.
+    """
+    *others, active = resolved
+    for each in active.stacked:
+        yield each.name, active, each
+    if not others:
+        return
+    there = {each.planned.key: each.planned for each in active.stacked}
+    found = list[tuple[ActiveStack, StackedTask]]()
+    for stack in reversed(others):
+        for each in stack.stacked if stack.contacts == active.contacts else ():
+            if each.planned.key not in there:
+                there[each.planned.key] = each.planned
+                found.append((stack, each))
+    for stack, each in found:
+        name = name_among(each.planned, there.values())
+        if name in active.task_rows:  # the older one, in the active stack
+            name = f"{name} (new)"
+        yield name, stack, each
+
+
 def _stacked(
     tasks: Sequence[PlannedTask], start: int, feedback: Mapping[int, FeedbackInForce]
 ) -> list[StackedTask]:
     """Return the tasks of a stack, one below the other from a row on."""
     stacked, row = list[StackedTask](), start
     for each in tasks:
-        name = each.task.name
-        newer = sum(one.task.name == name and one.key > each.key for one in tasks)
-        if newer:
-            name += " (old)" if newer == 1 else f" (old, {newer})"
         rows = slice(row, row + each.task.rows)
+        name = name_among(each, tasks)
         stacked.append(StackedTask(each, name, rows, feedback[each.key]))
         row = rows.stop
     return stacked
+
+
+def name_among(own: PlannedTask, tasks: Iterable[PlannedTask]) -> str:
+    """Return a task's name, or another one if there is a newer task of this name."""
+    name = own.task.name
+    newer = sum(each.task.name == name and each.key > own.key for each in tasks)
+    if not newer:
+        return name
+    return f"{name} (old)" if newer == 1 else f"{name} (old, {newer})"
 
 
 def _places(contacts: Sequence[Contact], start: int) -> dict[str, slice]:

@@ -74,9 +74,7 @@ class BoundMixture:
             evolving: The calls that write changing values, at a time.
         """
         self.state, self._choice = state, choice
-        # in this order active ones are consecutive, with one more part from one to the
-        # next
-        self._stacks = sorted(choice.members, key=_size)
+        self._stacks = sorted(choice.members, key=by_age)
         self._places = {each: k for k, each in enumerate(self._stacks)}
         count, many = len(self._stacks), len(limits.all)
         self._shares, self._on = np.zeros(count), np.zeros(count, dtype=np.int64)
@@ -126,7 +124,8 @@ class BoundMixture:
         steps += planned([mix]).steps()
         self.move = state.bind_move(steps, origin)
         self._move = self.move.__call__
-        self.active, self.damped = self._stacks[-1], ""
+        self.resolved = list[ActiveStack]()
+        self.damped = ""
         self._limits = limits
         self._mean = Delivered(mean[nv : 2 * nv], mean[:nv], mean[2 * nv :], EXACT, 0.0)
 
@@ -137,17 +136,19 @@ class BoundMixture:
             return [PartCall(self._choose, t=TIME)]
         members = [choice.members[each] for each in self._stacks]
         shape = len(self._stacks), len(choice.fading)
-        presences = np.zeros(len(choice.fading))
+        lows, highs = np.zeros((2, len(choice.fading)))
         chosen = PartCall(
             engine.ChooseSets,
-            presences=presences,
+            lows=lows,
+            highs=highs,
             members=np.array(members, dtype=np.int64).reshape(shape),
             on=self._on,
             shares=self._shares,
         )
         calls = list[AnyCall]()
         for k, each in enumerate(choice.fading):
-            calls += each.share_calls(presences[k : k + 1])
+            one = slice(k, k + 1)
+            calls += each.interval_calls(lows[one], highs[one])
         return [*calls, chosen]
 
     def _choose(self, t: float) -> None:
@@ -166,14 +167,17 @@ class BoundMixture:
             mixed = self.state.advance(self.move, t, q, v)
         if not mixed:
             return None
+        resolved: list[ActiveStack] = []
         self.damped = ""
         for share, stack in zip(self._shares.tolist(), self._stacks, strict=True):
             if share:
-                self.active, stack.share = stack, share
+                resolved.append(stack)
+                stack.share = share
                 self.damped = self.damped or stack.damped
+        self.resolved = resolved
         mean, status, forces = self._mean, self._worst.item(), self._mean.forces
         if forces.size:
-            forces = forces[self._whole.columns(self.active.support)]
+            forces = forces[self._whole.columns(resolved[-1].support)]
         relaxation = self._relaxation if status else mean.relaxation
         # Not `_replace`: its tuples would wake the garbage collector.
         return Delivered(
@@ -230,5 +234,10 @@ class _Placed:
         return calls
 
 
-def _size(stack: ActiveStack) -> tuple[int, int]:
-    return len(stack.contacts), len(stack.stacked)
+def by_age(stack: ActiveStack) -> tuple[int, list[int]]:
+    """Return a key that sorts sets: the last one has the most, and the newest, parts.
+
+    A set comes after all of its subsets.
+    """
+    keys = sorted((each.planned.key for each in stack.stacked), reverse=True)
+    return len(stack.contacts), keys

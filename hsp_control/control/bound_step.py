@@ -34,7 +34,7 @@ class BoundStep:
         origin: Array,
         evolving: Sequence[Step] = (),
     ) -> None:
-        self.active = active
+        self.active, self.resolved = active, [active]
         self.damped = ""  # tasks of the first level with a bounded inverse, by name
         # whether the effort is M a + N wherever no limit is violated
         self.direct = actuation.direct

@@ -263,7 +263,7 @@ class AddTask(Change, type="add_task"):
 
     def apply(self, setup: Setup) -> Setup:
         """Return the setup with the task; see `Change.apply`."""
-        there = [each.task for each in setup.tasks if each.presence.target == 1.0]
+        there = [each.task for each in setup.tasks if each.stays]
         with within("task"):
             check_tasks([*there, self.task], setup.start.state.robot)
         presence = ABSENT.then(self.at, self.ramp, 1.0)
@@ -272,7 +272,11 @@ class AddTask(Change, type="add_task"):
 
 
 class RemoveTask(Change, type="remove_task"):
-    """A task is removed; it fades out."""
+    """A task is removed; it fades out, and one that is added meanwhile fades in.
+
+    With equal times and ramps they exchange: the effort is the mean of both, so that
+    what both tasks control keeps its error equation.
+    """
 
     task: str
     """Name of the task."""
@@ -280,8 +284,8 @@ class RemoveTask(Change, type="remove_task"):
     def apply(self, setup: Setup) -> Setup:
         """Return the setup without the task; see `Change.apply`."""
         planned = _task(setup, self.task)
-        gone = planned.presence.then(self.at, self.ramp, 0.0)
-        return setup.with_task(planned, presence=gone)
+        gone = planned.departure.then(self.at, self.ramp, 1.0)
+        return setup.with_task(planned, departure=gone)
 
 
 class ChangeGains(Change, type="gains"):

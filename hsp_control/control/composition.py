@@ -164,7 +164,7 @@ class Composition:
         """The same tasks as they are planned, with their keys."""
         now = self._in_force.latest
         levels = [
-            tuple(each for each in level if each.presence.at(now) > 0.0)
+            tuple(each for each in level if each.present(now))
             for level in self._in_force.mixture.levels
         ]
         return tuple(level for level in levels if level)

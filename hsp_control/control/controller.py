@@ -107,17 +107,17 @@ class Controller(Commanded):
             t = self._state.t if isinstance(t, RobotState) else t
         else:
             delivered = step.make(t, q, v)  # type: ignore[arg-type]
-            stack, damped = step.active, step.damped
-            now.mixture.active = stack
+            now.mixture.resolved, damped = step.resolved, step.damped
         if delivered is None:
             mixture = now.mixture
             # references, the law, and the effort within the limits
             delivered = mixture.step(self._state.t, modifier)
-            stack, damped = self._active, mixture.damped
-            stack.check(delivered.effort)
+            damped = mixture.damped
+            self._active.check(delivered.effort)
             now.bind_step()
         self._memory.acceleration = delivered.acceleration
-        output = ControlOutput(delivered, stack, damped, now.limits.measured)
+        resolved, measured = now.mixture.resolved, now.limits.measured
+        output = ControlOutput(delivered, resolved, damped, measured)
         if now.later is not None:
             now.passed(self._state.t)
         motion = self._memory.motion
@@ -233,7 +233,7 @@ class Controller(Commanded):
         now = self._in_force
         now.limits.applied(tau, self._memory.acceleration, period)
         if now.gains.stiffening:
-            now.gains.delay(self._active, self._state.t, period)
+            now.gains.delay(self._resolved, self._state.t, period)
 
     def _while_free(self, advance: Callable[[FreeStep], int]) -> int:
         """Let the engine's loop make unconstrained steps; return their number."""
@@ -333,7 +333,7 @@ class Controller(Commanded):
             now.step = None
             if origin is not None:
                 memory.count_from(origin)
-            now.mixture.active = None  # the next step places relative values
+            now.mixture.resolved = []  # the next step places relative values
             remembers = any(each.task.remembers for each in self.setup.tasks)
             if changes or line.count or remembers:
                 self._compose(line.start, changes)
@@ -397,14 +397,28 @@ class Controller(Commanded):
         return self._active.shown
 
     @property
+    def stacks(self) -> list[ActiveStack]:
+        """All that the last `compute` resolved, read-only; `active_stack` is the last.
+
+        There are several while tasks or contacts fade in or out.
+
+        Raises:
+            ControllerError: If there was none yet.
+        """
+        return [each.shown for each in self._resolved]
+
+    @property
     def _active(self) -> ActiveStack:
+        return self._resolved[-1]
+
+    @property
+    def _resolved(self) -> list[ActiveStack]:
         mixture = self._in_force.mixture
-        if mixture.active is None:
+        if not mixture.resolved:
             if not self._memory.begun:
                 raise ControllerError("nothing has been computed yet")
             mixture.resolve(self._state.t)  # of a copy, or since a change
-        assert mixture.active is not None
-        return mixture.active
+        return mixture.resolved
 
     def without_python(self, period: float) -> "Controller":
         """Return a preview whose streams, weights and forces a program sets.

@@ -11,14 +11,14 @@ for the period h, then has the transition
     x(h) = x + h x' + ½ h² x'',     x'(h) = x' + h x''.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.errors import UnstableRateError
-from hsp_control.control.active_stack import ActiveStack
+from hsp_control.control.active_stack import ActiveStack, tasks_of
 from hsp_control.control.evolution import Evolution
 from hsp_control.control.followed_impedance import FollowedImpedance
 from hsp_control.control.memory import RunMemory, Waiting
@@ -141,10 +141,10 @@ class GainsInForce:
         """Whether impedances change, or wait; then `delay` belongs to every step."""
         return self._changing or bool(self._waiting)
 
-    def delay(self, active: ActiveStack, t: float, period: float) -> None:
+    def delay(self, resolved: Sequence[ActiveStack], t: float, period: float) -> None:
         """Delay changes of impedances that would add energy."""
         planned = {each.key: each for each in self._setup.tasks}
-        for each in active.stacked:
+        for _, active, each in tasks_of(resolved):
             now = planned.get(each.planned.key)
             if now is None:  # a change has ended it since
                 continue

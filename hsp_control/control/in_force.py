@@ -99,7 +99,7 @@ class InForce:
         end = max(each.end for each in time_line.open)
         over = time_line.settled_at(end)
         following = mixture.following(over.setup)
-        following.active = None  # a stack from before the change, freed now
+        following.resolved = []  # a stack from before the change, freed now
         following.prepare([end])
         step = following.bound_step(self._memory.origin, [])
         gains = self.gains.planned(over.setup)
@@ -126,9 +126,9 @@ class InForce:
         self.time_line, self.setup = later.time_line, later.time_line.setup
         gains = self.gains.go_over_to(later.gains)
         self._over = *over, gains, self.limits.go_over_to(later.limits)
-        active = self.mixture.active  # of the last step
+        resolved = self.mixture.resolved  # by the last step
         self.mixture, self.step, self.later = later.mixture, later.step, None
-        self.mixture.active = active
+        self.mixture.resolved = resolved
 
     def write(self, t: float) -> None:
         """Write the gains, the limits, the model and the tools of a time [s]."""

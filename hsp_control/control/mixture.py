@@ -8,6 +8,7 @@ from collections.abc import (
     Set,
 )
 from copy import copy
+from itertools import pairwise
 
 import numpy as np
 
@@ -17,7 +18,7 @@ from hsp_control.control.active_stack import ActiveStack
 from hsp_control.control.actuation import Actuation, Delivered, Status
 from hsp_control.control.actuation.limits_in_force import LimitSet, LimitsInForce
 from hsp_control.control.actuation.support import Support
-from hsp_control.control.bound_mixture import BoundMixture, Choice
+from hsp_control.control.bound_mixture import BoundMixture, Choice, by_age
 from hsp_control.control.bound_step import BoundStep
 from hsp_control.control.fitting import priority_of
 from hsp_control.control.gains_in_force import GainsInForce
@@ -58,22 +59,23 @@ would cost more than the step."""
 class Mixture:
     """Resolves the law for the contacts and tasks that are active at a time.
 
-    A task that fades in or out has a weight between 0 and 1, and so has a contact that
-    is almost lifted (`PlannedContact.share`), or else the task that takes its place
-    (`PlannedTask.weight_beyond`). With w1 ≥ w2 ≥ ... these, a step is
+    A step is the mean over u in (0, 1) of d(u), the result of the law within the limits
+    for the parts that are active at u: a task where departure < u < presence; a contact
+    that is almost lifted where u < its share (`PlannedContact.share`), and beyond that
+    the task that takes its place (`PlannedTask.weight_beyond`). So with w1 ≥ w2 ≥ ...
+    the presences of tasks that come, a step is
 
         (1 - w1) d{} + (w1 - w2) d{1} + (w2 - w3) d{1, 2} + ...
 
-    with d{...} the result of the law for the parts of weight 1 and those in braces
-    within the limits. It is continuous in the weights, whatever binds. It keeps the
-    limits, because they are convex in the acceleration, the effort and the forces,
-    which are affine in one another. The rows of the tasks in all sets are linear in the
-    acceleration, so that these tasks keep their exact error equation throughout where
-    no limit binds.
+    and with a task that comes, w, while another one goes, (1 - w) d{old} + w d{new}.
+    It is continuous, whatever binds. It keeps the limits, because they are convex in
+    the acceleration, the effort and the forces, which are affine in one another. What
+    is controlled by the same rows in all sets keeps its exact error equation, since
+    these are linear in the acceleration, where no limit binds.
     """
 
-    # stack that was resolved last, with the most tasks of a mixture; None before
-    active: ActiveStack | None
+    # the stacks that were resolved last, the active one at the end; empty before
+    resolved: list[ActiveStack]
     steady: bool  # whether tasks, contacts and limits are the same at all times
     # tasks of each level, the highest priority first
     levels: tuple[tuple[PlannedTask, ...], ...]
@@ -91,7 +93,7 @@ class Mixture:
         self._gains, self._threshold = gains, threshold
         self._stacks: dict[_Active, ActiveStack] = {}
         self._actuations: dict[tuple[ActiveStack, LimitSet], Actuation] = {}
-        self.field, self.active = setup.field, None
+        self.field, self.resolved = setup.field, []
         self._follow(setup)
 
     def following(self, setup: Setup) -> "Mixture":
@@ -130,7 +132,6 @@ class Mixture:
         self._only: list[
             tuple[float, ActiveStack]
         ] = []  # if it is the same at all times
-        self._parts: list[ActiveStack] = []
         # tasks of the first level with a bounded inverse in the last `resolve`, by
         # name; empty: none
         self.damped = ""
@@ -148,16 +149,17 @@ class Mixture:
         self._resolve(t, self._sets(t))
 
     def _resolve(self, t: float, sets: Iterable[tuple[float, ActiveStack]]) -> None:
-        self._parts, self.damped = [], ""
+        parts: list[ActiveStack] = []
+        self.damped = ""
         for share, active in sets:
             active.share = share
-            self._parts.append(active)
+            parts.append(active)
             outcome = active.resolve(t)
             if outcome is NOT_FINITE:
                 active.raise_not_finite()
             if outcome is DAMPED and not self.damped:
                 self.damped = active.damped
-        self.active = active
+        self.resolved = parts
 
     def _sets(self, t: float) -> list[tuple[float, ActiveStack]]:
         """Return the share of each set that is active at a time, and its stack."""
@@ -170,38 +172,41 @@ class Mixture:
             for share, each in contacts
             if share < 1.0 and each.active(t)  # also at the time when it begins
         }
-        coming = [pair for pair in (*tasks, *contacts) if 0.0 < pair[0] < 1.0]
-        coming.sort(key=_weight, reverse=True)
-        sets, on, share = list[tuple[float, ActiveStack]](), set[int](), 1.0
-        for following, each in (*coming, _NOTHING):
-            if share != following:
-                lift = {id(c) for w, c in contacts if w < 1.0 and id(c) not in on}
-                standing = [c for c in self._setup.contacts if id(c) not in lift]
-                lifted = [edge for key, edge in edges.items() if key not in on]
-                off = [
-                    task.key
-                    for w, task in tasks
-                    if (task.weight_beyond(t, lifted) if lifted else w) < 1.0
-                    and id(task) not in on
-                ]
-                sets.append((share - following, self._stack(standing, off)))
-            on.add(id(each))
-            share = following
+        partly = [
+            *((id(each), *each.interval(t)) for w, each in tasks if 0.0 < w < 1.0),
+            *((id(each), 0.0, share) for share, each in contacts if 0.0 < share < 1.0),
+        ]
+        ends = {u for _, *interval in partly for u in interval}
+        sets: dict[ActiveStack, float] = {}
+        for high, low in pairwise(sorted({0.0, 1.0, *ends}, reverse=True)):
+            on = {key for key, begin, end in partly if begin <= low and high <= end}
+            lift = {id(c) for w, c in contacts if w < 1.0 and id(c) not in on}
+            standing = [c for c in self._setup.contacts if id(c) not in lift]
+            lifted = [edge for key, edge in edges.items() if key not in on]
+            off = [
+                task.key
+                for w, task in tasks
+                if (task.weight_beyond(t, lifted) if lifted else w) < 1.0
+                and id(task) not in on
+            ]
+            stack = self._stack(standing, off)
+            sets[stack] = sets.get(stack, 0.0) + (high - low)
+        ordered = [(sets[each], each) for each in sorted(sets, key=by_age)]
         if self._same_sets:
-            self._only = sets
-        return sets
+            self._only = ordered
+        return ordered
 
     def _deliver(self, modifier: AccelerationModifier | None) -> Delivered:
         """Return the result for the law that was resolved last."""
         # During a transition between sets of limits: the mixture of the steps within
         # both.
         sets = self._limits.sets
-        single = len(self._parts) == len(sets) == 1
+        single = len(self.resolved) == len(sets) == 1
         shares: list[float] = []
         parts: list[Array] = []
         worst, relaxation = Status.EXACT, 0.0
-        whole = self._parts[-1].support
-        for active in self._parts:
+        whole = self.resolved[-1].support
+        for active in self.resolved:
             a, offset = active.acceleration, None
             if modifier is not None:
                 # It may change its acceleration in place: that one is a copy.
@@ -334,14 +339,6 @@ class Mixture:
             law = gains.feedback, metric, self.field, gains.null_space, self._threshold
             self._stacks[key] = ActiveStack(self._state, support, levels, *law)
         return self._stacks[key]
-
-
-_NOTHING = 0.0, None
-"""The end of the parts that have a weight."""
-
-
-def _weight(pair: tuple[float, object]) -> float:
-    return pair[0]
 
 
 def _mean(shares: Sequence[float], parts: Sequence[Array]) -> Array:

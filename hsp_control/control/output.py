@@ -1,6 +1,6 @@
 """The output of a controller: an effort, and its diagnosis."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -8,10 +8,18 @@ import numpy as np
 from hsp_control.common.arrays import Array
 from hsp_control.common.errors import ControllerError
 from hsp_control.common.suggestions import did_you_mean, listing
-from hsp_control.control.active_stack import ActiveStack, Layout
+from hsp_control.control.active_stack import ActiveStack, Layout, tasks_of
 from hsp_control.control.actuation import Delivered, Status
 from hsp_control.law import FieldSample, TaskSample, singular_values
 from hsp_control.law.problem import StepRecord
+
+
+class ReplacedTask(NamedTuple):
+    """The errors of a task that another one replaces, while it fades out."""
+
+    error: Array  # shape (m,) [m or rad]
+    error_rate: Array  # shape (m,) [m/s or rad/s]
+    bounded: float  # length of the part of the error that is not fed back [m or rad]
 
 
 class ControlOutput:
@@ -39,6 +47,7 @@ class ControlOutput:
         "_distances",
         "_layout",
         "_memory",
+        "_replaced",
         "_views",
         "damped",
         "forces",
@@ -57,16 +66,18 @@ class ControlOutput:
     _distances: Sequence[tuple[str, bytes]]  # of each barrier, of all its pairs
     _layout: Layout  # of the memory
     _memory: bytes  # see `ActiveStack.memory`
+    _replaced: Mapping[str, ReplacedTask]  # by name
     _views: StepRecord | None  # of the memory, once they were read
 
     def __init__(
         self,
         delivered: Delivered,
-        stack: ActiveStack,
+        resolved: Sequence[ActiveStack],
         damped: str,
         measured: Sequence[tuple[str, Callable[[], Array]]],
     ) -> None:
         """Copy the results of a step: its effort, its memory, measured distances."""
+        stack = resolved[-1]
         tau, a, forces, self.status, self.relaxation = delivered
         self.tau, self._memory, self._views = tau.copy(), stack.memory.tobytes(), None
         self._acceleration = None if a is stack.acceleration else a.tobytes()
@@ -75,6 +86,7 @@ class ControlOutput:
         self._distances = ()
         if measured:
             self._distances = [(name, found().tobytes()) for name, found in measured]
+        self._replaced = _NONE if len(resolved) == 1 else _replaced(resolved)
 
     @property
     def distances(self) -> dict[str, float]:
@@ -106,32 +118,40 @@ class ControlOutput:
             away = away_of(error[rows])
             if away > 0.0:
                 found[task] = away
-        return found
+        gone = {name: each.bounded for name, each in self._replaced.items()}
+        return found | {name: away for name, away in gone.items() if away > 0.0}
 
     def error(self, task: str) -> Array:
         """Return the error e of a task, as its class defines it, shape (m,) [m or rad].
 
+        While a task replaces another one of its name, the older one is ``NAME (old)``.
+
         Raises:
             ControllerError: If no such task is active at this time.
         """
+        if task in self._replaced:
+            return self._replaced[task].error.copy()
         return self._record.task.error[self._rows_of(task)].copy()
 
     def error_rate(self, task: str) -> Array:
         """Return e' of a task, shape (m,) [m/s or rad/s]; see `error`."""
+        if task in self._replaced:
+            return self._replaced[task].error_rate.copy()
         return self._record.task.error_rate[self._rows_of(task)].copy()
 
     def _rows_of(self, task: str) -> slice:
         places = self._layout.places
         if task not in places:
-            near = did_you_mean(task, places)
+            there = [*places, *self._replaced]
+            near = did_you_mean(task, there)
             raise ControllerError(
-                f"no task {task!r} is active now{near} (there are {listing(places)})"
+                f"no task {task!r} is active now{near} (there are {listing(there)})"
             )
         return places[task]
 
     @property
     def task(self) -> TaskSample:
-        """All tasks stacked: J, J', e, e', a_x."""
+        """All tasks stacked: J, J', e, e', a_x; without those that others replace."""
         return self._record.task
 
     @property
@@ -145,7 +165,8 @@ class ControlOutput:
         return self._record.null_space_error
 
     def __repr__(self) -> str:
-        sizes = {f"e of {name}": self.error(name) for name in self._layout.places}
+        names = *self._layout.places, *self._replaced
+        sizes = {f"e of {name}": self.error(name) for name in names}
         sizes["e_N"] = self.null_space_error
         notes = [
             f"|{name}| = {np.linalg.norm(each):.3g}" for name, each in sizes.items()
@@ -177,6 +198,22 @@ class ControlOutput:
             memory = np.frombuffer(self._memory)
             self._views = StepRecord.over(memory, self._layout.rows, len(self.tau))
         return self._views
+
+
+_NONE: Mapping[str, ReplacedTask] = {}
+
+
+def _replaced(resolved: Sequence[ActiveStack]) -> dict[str, ReplacedTask]:
+    """Return the tasks that the last one of the stacks does not have, by name."""
+    found = dict[str, ReplacedTask]()
+    for name, stack, each in tasks_of(resolved):
+        if stack is resolved[-1]:
+            continue
+        error, rate = stack.rows.error[each.rows], stack.rows.error_rate[each.rows]
+        bounds = stack.layout.bounds
+        away = next((of(error) for _, rows, of in bounds if rows == each.rows), 0.0)
+        found[name] = ReplacedTask(error.copy(), rate.copy(), max(away, 0.0))
+    return found
 
 
 class Diagnostics(NamedTuple):

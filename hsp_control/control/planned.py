@@ -30,25 +30,49 @@ class PlannedTask:
 
     key: int  # unique, also among tasks of the same name
     task: Task  # placed
-    presence: Evolution[float]  # 1 while it is part of the controller, 0 while not
+    presence: Evolution[float]  # from 0 to 1 while it becomes part of the controller
     # numbers of its feedback: Kp and Kv, shape (2, m, m) [1/s², 1/s], or those of an
     # impedance; see `Task.in_force`
     gains: Evolution[Array]
+    departure: Evolution[float] = ABSENT  # from 0 to 1 while it is removed
 
     @property
     def unscheduled(self) -> bool:
         """Whether only changes activate it."""
         return self.task.schedule is None
 
-    def share_calls(self, share: Array) -> PartCalls:
-        """Return the call that writes `weight`, shape (1,), where it is unscheduled."""
-        return [self.presence.call(share)]
+    @property
+    def stays(self) -> bool:
+        """Whether it is there after all changes."""
+        return self.presence.target == 1.0 and self.departure.target == 0.0
+
+    @property
+    def gone(self) -> bool:
+        """Whether it is not there, and will not be."""
+        return self.presence == ABSENT or self.departure == PRESENT
+
+    def present(self, t: float) -> bool:
+        """Return whether it is part of the controller at time t [s], also in part."""
+        return self.presence.at(t) > self.departure.at(t)
+
+    def interval_calls(self, low: Array, high: Array) -> PartCalls:
+        """Return the calls that write `interval` where it is unscheduled, shapes (1,).
+
+        Before them both are zero.
+        """
+        gone = [] if self.departure.constant else [self.departure.call(low)]
+        return [self.presence.call(high), *gone]
+
+    def interval(self, t: float) -> tuple[float, float]:
+        """Return the interval in (0, 1) where it is active at time t: see `Mixture`."""
+        present, schedule = self.presence.at(t), self.task.schedule
+        active = present if schedule is None else present * schedule.weight(t)
+        return self.departure.at(t), active
 
     def weight(self, t: float) -> float:
         """Return the weight of the task at time t [s], in [0, 1]."""
-        present = self.presence.at(t)
-        schedule = self.task.schedule
-        return present if schedule is None else present * schedule.weight(t)
+        low, high = self.interval(t)
+        return max(high - low, 0.0)
 
     def weight_beyond(self, t: float, edges: Sequence[float]) -> float:
         """Return its weight at time t where some contacts are lifted.
@@ -60,8 +84,8 @@ class PlannedTask:
         now, schedule = self.weight(t), self.task.schedule
         if schedule is None or schedule.ramp or 0.0 < now < 1.0:
             return now
-        present = self.presence.at(t)
-        there = (present * schedule.weight(edge) for edge in edges)
+        present, gone = self.presence.at(t), self.departure.at(t)
+        there = (max(present * schedule.weight(x) - gone, 0.0) for x in edges)
         return next((each for each in there if each != now), now)
 
     @property
@@ -69,7 +93,8 @@ class PlannedTask:
         """Whether its weight is 1 at all times."""
         schedule = self.task.schedule
         unscheduled = schedule is None or (schedule.constant and not schedule.ramp)
-        return unscheduled and self.presence == PRESENT
+        stays = self.presence == PRESENT and self.departure == ABSENT
+        return unscheduled and stays
 
 
 @dataclass(frozen=True)
@@ -146,10 +171,13 @@ class PlannedContact:
         """Whether only changes activate it."""
         return self.contact.schedule is None
 
-    def share_calls(self, share: Array) -> PartCalls:
-        """Return the calls that write `share`, shape (1,), where it is unscheduled."""
+    def interval_calls(self, low: Array, high: Array) -> PartCalls:
+        """Return the calls that write 0 and `share` where it is unscheduled, (1,).
+
+        Before them both are zero.
+        """
         weight = np.zeros(1)
-        given = {"weight": weight, "held": HELD, "share": share}
+        given = {"weight": weight, "held": HELD, "share": high}
         return [self.presence.call(weight), PartCall(engine.FadingContact, **given)]
 
     def active(self, t: float) -> bool:

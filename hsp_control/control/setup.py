@@ -78,6 +78,7 @@ class Setup:
             self.gain,
             self.gravity,
             *(task.presence for task in self.tasks),
+            *(task.departure for task in self.tasks),
             *(task.gains for task in self.tasks),
             *(term.presence for term in self.terms),
             *(term.weight for term in self.terms if term.weight is not None),
@@ -96,6 +97,7 @@ class Setup:
         events = set[float]()
         for task in self.tasks:
             events |= _events(task.presence, task.task.schedule)
+            events |= _events(task.departure, None)
         for contact in self.contacts:
             events |= _events(contact.presence, contact.contact.schedule)
         for _, share in self.limits.sets:
@@ -116,13 +118,13 @@ class Setup:
 
     def task(self, name: str) -> PlannedTask:
         """Return the task that has a name, after all changes so far."""
-        present = [each for each in self.tasks if each.presence.target == 1.0]
+        present = [each for each in self.tasks if each.stays]
         return _found("task", name, {each.task.name: each for each in present})
 
     def present_task(self, name: str, t: float) -> PlannedTask:
         """Return the newest task of a name that is active at time t [s], or will be."""
         for each in reversed(self.tasks):
-            if each.task.name == name and each.presence.at(t) > 0.0:
+            if each.task.name == name and each.present(t):
                 return each
         return self.task(name)
 
@@ -147,6 +149,7 @@ class Setup:
                 task=settled(each.task, t),
                 presence=each.presence.settled(t),
                 gains=each.gains.settled(t),
+                departure=each.departure.settled(t),
             )
             for each in self.tasks
         ]
@@ -168,7 +171,7 @@ class Setup:
         return Setup(
             self.start._replace(scene=settled(self.start.scene, t)),
             self.metric,
-            tuple(each for each in tasks if each.presence != ABSENT),
+            tuple(each for each in tasks if not each.gone),
             tuple(each for each in terms if each.presence != ABSENT),
             self.gain.settled(t),
             tuple(contacts),

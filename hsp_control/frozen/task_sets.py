@@ -106,7 +106,8 @@ class TaskSets:
         members = np.arange(count)[:, None] >> np.arange(len(self.names)) & 1
         choose = PartCall(
             engine.ChooseSets,
-            presences=self.presences,
+            lows=np.zeros(len(self.names)),
+            highs=self.presences,
             members=members,
             on=on,
             shares=shares,

@@ -13,7 +13,7 @@ from hsp_control.constraints.limits import (
     RobotLimits,
     barrier_names,
 )
-from hsp_control.control.active_stack import ActiveStack, StackedTask
+from hsp_control.control.active_stack import ActiveStack, StackedTask, tasks_of
 from hsp_control.control.controller import Controller
 from hsp_control.control.measurement import LogChannel
 from hsp_control.control.output import ControlOutput
@@ -206,18 +206,20 @@ class TaskColumns:
             stiffness = parts_of(each.in_force.numbers).K
             row[f"{prefix}.stiffness"][:] = np.diag(stiffness)
 
-    def sources(self, active: ActiveStack, law: StepRecord) -> Sources:
+    def sources(self, stacks: Sequence[ActiveStack], law: StepRecord) -> Sources:
         """Return the law's arrays of the active tasks, which `write_law` writes, too.
 
-        To look at an active stack in every row would cost a third of the row.
+        Those of ``law`` are the active stack's, the last one. To look at a stack in
+        every row would cost a third of the row.
         """
         found: list[tuple[str, Array]] = []
         self._active, self._springs = [], []
-        for each in active.stacked:
+        for name, stack, each in tasks_of(stacks):
             prefix = f"task.{self._names.present[each.planned.key]}"
-            found.append((f"{prefix}.error", law.task.error[each.rows]))
-            found.append((f"{prefix}.error_rate", law.task.error_rate[each.rows]))
-            self._active.append((prefix, each.name))
+            rows = law.task if stack is stacks[-1] else stack.rows
+            found.append((f"{prefix}.error", rows.error[each.rows]))
+            found.append((f"{prefix}.error_rate", rows.error_rate[each.rows]))
+            self._active.append((prefix, name))
             if impedance_of(each.planned.task) is not None:
                 self._springs.append((prefix, each))
         return iter(found)

@@ -1,7 +1,7 @@
 """Writes the log of a run row by row, in memory or into a journal, or both."""
 
 import platform
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
@@ -90,7 +90,7 @@ class LogWriter:
         self._streams: dict[int, StreamRun] = {}
         self._placed: dict[str, Array] = {}  # where the obstacles are
         self._law: StepRecord | None = None  # of the present row
-        self._active: ActiveStack | None = None  # the stack of `_sources`
+        self._stacks: list[ActiveStack] = []  # those of `_sources`
         self._sources: list[tuple[str, Array]] = []  # the law's arrays for columns
         robot, column = controller.robot, columns.add
         nv, units = robot.nv, dict.fromkeys(robot.units)
@@ -173,7 +173,7 @@ class LogWriter:
                 self._barriers.update()
             self._keep_messages()
             columns.lay_out()
-            self._active = None
+            self._stacks = []
         row = columns.row
         row["t"][...] = state.t
         row["q"][:], row["v"][:], row["tau"][:] = state.q, state.v, tau
@@ -218,11 +218,11 @@ class LogWriter:
 
     def _fill_law(self, state: RobotState, output: ControlOutput) -> None:
         controller, columns = self._controller, self._columns
-        active = controller.active_stack
+        stacks = controller.stacks
         before = self._law
         self._law = law = output.explanation(before)
-        if active is not self._active or law is not before:
-            self._active, self._sources = active, self._find_sources(active, law)
+        if stacks != self._stacks or law is not before:
+            self._stacks, self._sources = stacks, self._find_sources(stacks, law)
         diagnostics = controller.diagnose()
         values = diagnostics.singular_values
         columns.widen("singular_values", len(values))
@@ -235,7 +235,7 @@ class LogWriter:
         row["null_space_norm"][...] = diagnostics.null_space_norm
         row["manipulability"][...] = diagnostics.manipulability
         row["singular_values"][: len(values)] = values
-        row["damped"][...] = active.damped_level if output.damped else 0
+        row["damped"][...] = stacks[-1].damped_level if output.damped else 0
         row["status"][...] = output.status
         row["relaxation"][...] = output.relaxation
         self._contacts.write(state.t, output)
@@ -243,15 +243,15 @@ class LogWriter:
         self._barriers.write(state)
 
     def _find_sources(
-        self, active: ActiveStack, law: StepRecord
+        self, stacks: Sequence[ActiveStack], law: StepRecord
     ) -> list[tuple[str, Array]]:
         """Return the law's arrays of the columns."""
         return [
             ("acceleration", law.acceleration),
             ("field.g", law.field.g),
             ("null_space_error", law.null_space_error),
-            *self._tasks.sources(active, law),
-            *self._terms.sources(active),
+            *self._tasks.sources(stacks, law),
+            *self._terms.sources(stacks[-1]),
         ]
 
     def _write_heading(self) -> None:

@@ -19,7 +19,7 @@ CHANGES: dict[str, Callable[[Changes], object]] = {
     "add": lambda at: at.add(POSTURE),
     "remove": lambda at: at.remove("turned"),
     "exchange": lambda at: at.remove("turned").add(POSTURE),
-    # together they are damped: both constrain the same motion
+    # both constrain the same motion
     "same": lambda at: at.remove("hand").add(hsp.FramePosition("panda_tcp")),
     "limits": lambda at: at.limits(hsp.Limits(bandwidth=30.0)),
     "no limits": lambda at: at.limits(None),

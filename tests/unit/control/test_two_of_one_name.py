@@ -46,9 +46,9 @@ def test_each_has_its_rows_and_errors() -> None:
     q = ROBOT.home() + 0.01 * np.arange(7.0)
     made.compute(0.0, q, REST)
     output = made.compute(0.2, q, REST)
-    assert list(made.task_rows) == ["hand (old)", "hand"]
-    assert made.task_rows["hand (old)"] == slice(0, 3)
-    assert made.task_rows["hand"] == slice(3, 6)
+    assert made.task_rows == {"hand": slice(0, 3)}
+    assert [each.task_rows for each in made.stacks] == 2 * [made.task_rows]
+    assert "e of hand (old)" in repr(output)
     np.testing.assert_allclose(output.error("hand (old)"), [0.0, -0.01, -0.02])
     state = ROBOT.state(0.2, q, REST)
     expected = point(NEW).evaluate(state).error
@@ -98,9 +98,9 @@ def test_impedances_of_one_name_wait_by_themselves() -> None:
     made.at(0.1).ramp(0.4).remove("hand").add(second)
     for k in range(300):
         made.applied(made.compute(k * H, ROBOT.home(), REST).tau, H)
-    placed = {each.name: each.in_force for each in made.active_stack.stacked}
-    found = {name: parts_of(each.numbers).K[0, 0] for name, each in placed.items()}
-    assert found == {"hand (old)": 800.0, "hand": 200.0}
+    placed = [each for stack in made.stacks for each in stack.stacked]
+    found = [parts_of(each.in_force.numbers).K[0, 0] for each in placed]
+    assert found == [800.0, 200.0]
 
 
 def log_of_exchange(compensation: Compensation, new: hsp.Task) -> hsp.Rollout:
