@@ -179,6 +179,8 @@ class Mixture:
         ends = {u for _, *interval in partly for u in interval}
         sets: dict[ActiveStack, float] = {}
         for high, low in pairwise(sorted({0.0, 1.0, *ends}, reverse=True)):
+            if high - low < _ROUNDING:
+                continue
             on = {key for key, begin, end in partly if begin <= low and high <= end}
             lift = {id(c) for w, c in contacts if w < 1.0 and id(c) not in on}
             standing = [c for c in self._setup.contacts if id(c) not in lift]
@@ -339,6 +341,10 @@ class Mixture:
             law = gains.feedback, metric, self.field, gains.null_space, self._threshold
             self._stacks[key] = ActiveStack(self._state, support, levels, *law)
         return self._stacks[key]
+
+
+_ROUNDING = 1e-12
+"""What is shorter is no share: times of two schedules that meet differ by rounding."""
 
 
 def _mean(shares: Sequence[float], parts: Sequence[Array]) -> Array:

@@ -65,9 +65,9 @@ class PlannedTask:
 
     def interval(self, t: float) -> tuple[float, float]:
         """Return the interval in (0, 1) where it is active at time t: see `Mixture`."""
-        present, schedule = self.presence.at(t), self.task.schedule
-        active = present if schedule is None else present * schedule.weight(t)
-        return self.departure.at(t), active
+        schedule = self.task.schedule
+        low, high = (0.0, 1.0) if schedule is None else schedule.interval(t)
+        return max(low, self.departure.at(t)), high * self.presence.at(t)
 
     def weight(self, t: float) -> float:
         """Return the weight of the task at time t [s], in [0, 1]."""
@@ -84,8 +84,8 @@ class PlannedTask:
         now, schedule = self.weight(t), self.task.schedule
         if schedule is None or schedule.ramp or 0.0 < now < 1.0:
             return now
-        present, gone = self.presence.at(t), self.departure.at(t)
-        there = (max(present * schedule.weight(x) - gone, 0.0) for x in edges)
+        whole = max(self.presence.at(t) - self.departure.at(t), 0.0)
+        there = (whole * schedule.weight(x) for x in edges)
         return next((each for each in there if each != now), now)
 
     @property

@@ -12,6 +12,7 @@ from hsp_control import engine
 from hsp_control.common.errors import ScheduleError
 from hsp_control.declaration import Part
 from hsp_control.declaration.quantities import NonNegative, Number, plain
+from hsp_control.engine.plans import implemented_by
 
 
 def _finite_or_none(value: object) -> object:
@@ -119,6 +120,22 @@ class Schedule(Part, error=ScheduleError):
                     return 1.0
                 return _smooth((t - start) / self.ramp) * _smooth((end - t) / self.ramp)
         return 0.0
+
+    def interval(self, t: float) -> tuple[float, float]:
+        """Return an interval in (0, 1) of length w(t), t in s, C² in t.
+
+        It grows from 0, and shrinks towards 1, so that it and that of something that
+        comes meanwhile fill (0, 1) together.
+        """
+        if implemented_by(self, "interval", "weight") == "weight":  # in a derived class
+            return 0.0, self.weight(t)
+        for start, end in self.windows:
+            if start <= t < end:
+                if self.ramp == 0.0:
+                    return 0.0, 1.0
+                since_end = (t - end) / self.ramp
+                return _smooth(1.0 + since_end), _smooth((t - start) / self.ramp)
+        return 0.0, 0.0
 
 
 def _smooth(s: float) -> float:

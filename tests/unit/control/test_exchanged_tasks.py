@@ -1,6 +1,7 @@
 """A task that comes while another one goes: the step is the mean of both laws."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -58,6 +59,41 @@ def test_what_both_control_keeps_its_error_equation(
     assert np.any(there, axis=0).all()
     away = np.array([np.linalg.norm(each, axis=1) for each in errors])
     assert np.nanmax(away[:, log.t > BEGIN]) < 1.5e-4
+
+
+def test_schedules_exchange_tasks_likewise() -> None:
+    """One ends with the ramp with which the other one begins."""
+    robot, Schedule = hsp.Robot.load("panda"), hsp.trajectories.Schedule
+    first = circling(blend=0.4, schedule=Schedule([(None, 0.9)], ramp=RAMP))
+    second = circling(
+        gains=hsp.Gains(natural_frequency=15.0),
+        schedule=Schedule([(0.5, None)], ramp=RAMP),
+    )
+    tasks = [first, replace(second, name="second")]
+    made = hsp.Controller(robot, tasks, hsp.JointCentering())
+    log = hsp.simulate(made, robot.home(), duration=1.2, control_period=H)
+    errors = [log[x] for x in ("task.hand.error", "task.second.error")]
+    there = [np.isfinite(each).all(axis=1) for each in errors]
+    fading = (log.t > BEGIN + 2 * H) & (log.t < BEGIN + RAMP - 2 * H)
+    np.testing.assert_array_equal(np.all(there, axis=0)[fading], True)
+    away = np.array([np.linalg.norm(each, axis=1) for each in errors])
+    assert np.nanmax(away[:, log.t > BEGIN]) < 1.5e-4
+
+
+INTERVALS = [(None, 1.0), (1.0, 2.0), (2.5, None)]
+
+
+@pytest.mark.parametrize("ramp", [0.0, 0.3])
+def test_an_interval_is_as_long_as_the_weight(ramp: float) -> None:
+    """It begins at 0 and ends at 1, with a rise that ends before the fall begins."""
+    schedule = hsp.trajectories.Schedule(INTERVALS, ramp=ramp)
+    times = np.linspace(0.0, 4.0, 4001)
+    low, high = np.array([schedule.interval(t) for t in times]).T
+    weight = np.array([schedule.weight(t) for t in times])
+    np.testing.assert_allclose(high - low, weight, rtol=0, atol=1e-14)
+    assert not np.any((low > 0.0) & (high < 1.0))
+    falling = (times > 0.71) & (times < 1.0)
+    assert np.all(low[falling] > 0.0) == (ramp > 0.0)
 
 
 def point(offset: Array, name: str = "hand") -> hsp.FramePosition:
