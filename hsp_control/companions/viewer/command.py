@@ -16,6 +16,7 @@ from hsp_control.cli.options import (
     add_strict,
     loaded,
 )
+from hsp_control.common.errors import ViewerError
 
 if TYPE_CHECKING:
     from hsp_control.companions.viewer.comparison import ComparedRun
@@ -149,6 +150,8 @@ def _add_run_options(run: argparse.ArgumentParser) -> None:
 
 def _open(options: argparse.Namespace, *about: Any) -> AbstractContextManager[Any]:
     if not options.view:
+        if options.port is not None:
+            raise ViewerError("--port is that of a page: it needs --view")
         return nullcontext()
     from hsp_control.companions.viewer.pages import Screen
 

@@ -112,6 +112,15 @@ def test_the_page_of_a_run_opens_once_and_shows_its_robot(
     assert page.last("clip", "/clip")
 
 
+def test_a_port_without_a_page_is_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = ["--out", str(tmp_path)]
+    assert main(["run", MOVING, "--port", "7007", *out, *SHORT]) == 2
+    assert "--port is that of a page: it needs --view" in capsys.readouterr().err
+    assert not [*tmp_path.iterdir()]
+
+
 @pytest.mark.process
 def test_a_port_in_use_is_reported_and_the_run_continues(
     tmp_path: Path, log: Path, taken: int, capsys: pytest.CaptureFixture[str]
