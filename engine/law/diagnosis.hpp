@@ -55,7 +55,7 @@ struct SingularValues {
   Out<'s'> values;
 
   void operator()() {
-    // Its columns are nearer to orthogonal than the rows of the matrix that it factorises.
+    // Of a triangle, one-sided Jacobi needs fewer sweeps than of the matrix that it factorises.
     Matrix none;
     orthogonalise_rows(T, none);
     values = T.rowwise().norm();

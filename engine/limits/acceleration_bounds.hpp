@@ -40,17 +40,17 @@ constexpr double held_time = 0.002;
 // The accelerations that a position limit permits.
 //
 // A mean error would pass the limit by the error over α². So the barrier compensates the worst
-// recent mean towards it, `least` at the lower end and `most` at the upper one, and all of the
-// present `lasting` error.
+// recent mean towards it, `least` at the lower end and `most` at the upper one, up to `shift`, and
+// the present `lasting` error, up to what a jerk of `held_time` changes.
 template <class Held>
 Range of_position(Index i, double q, double v, const MotionLimits<In>& limits, const Held& held) {
   const double alpha = limits.bandwidth[0], lower = limits.lower[i], upper = limits.upper[i];
   const double damping = 2.0 * alpha * v;
   const double shift = most_shift * alpha * alpha * (upper - lower);
-  const double lasting = std::max(shift, held_time * limits.jerk[i]);
+  const double most_lasting = std::max(shift, held_time * limits.jerk[i]);
   Range range = {-alpha * alpha * (q - lower) - damping, alpha * alpha * (upper - q) - damping};
-  range.low += std::max(std::min(-held.least[i], shift), std::min(-held.lasting[i], lasting));
-  range.high -= std::max(std::min(held.most[i], shift), std::min(held.lasting[i], lasting));
+  range.low += std::max(std::min(-held.least[i], shift), std::min(-held.lasting[i], most_lasting));
+  range.high -= std::max(std::min(held.most[i], shift), std::min(held.lasting[i], most_lasting));
   range.low -= std::max(held.steady[i], 0.0);
   range.high -= std::min(held.steady[i], 0.0);
   return range;

@@ -5,8 +5,8 @@
 //   E' = fᵀx' - e'ᵀ(D + D_ζ) e' + ∂U/∂t.
 //
 // The values in force follow the planned ones only as fast as ∂U/∂t is no more than the power of
-// the damping. Where they are behind they catch up in half of the change's ramp, so that
-// no effort jumps.
+// the damping. Where they are behind they catch up with half of the change's ramp as time constant,
+// so that no effort jumps.
 #pragma once
 #include <algorithm>
 

@@ -1,6 +1,9 @@
 """The lock of a controller, which several threads may share."""
 
 import os
+import sys
+from collections.abc import Iterator
+from functools import cached_property
 from threading import RLock, get_ident
 from weakref import WeakSet
 
@@ -58,6 +61,19 @@ _locks: WeakSet[StepLock] = WeakSet()
 def _after_fork() -> None:
     for each in [*_locks]:
         each.forked()
+    if sys.version_info < (3, 12):
+        # They have one lock for all objects of a class, which a thread may have held.
+        for kind in _subclasses(object):
+            for member in vars(kind).values():
+                if isinstance(member, cached_property):
+                    member.lock = RLock()  # type: ignore[attr-defined]
+
+
+def _subclasses(kind: type) -> Iterator[type]:
+    own: list[type] = type.__subclasses__(kind)  # `type` itself has another method
+    for each in own:
+        yield each
+        yield from _subclasses(each)
 
 
 if hasattr(os, "register_at_fork"):  # where processes can fork

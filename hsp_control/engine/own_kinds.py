@@ -117,7 +117,11 @@ def load(file: str | os.PathLike[str]) -> SimpleNamespace:
             kinds = load_library(str(path))
         except RuntimeError as error:
             raise EngineError(f"{path.name} declares no kinds: {error}") from None
-        _LOADED[path] = SimpleNamespace(**{kind.name: kind for kind in kinds})
+        names = [kind.name for kind in kinds]
+        for name in names:
+            if names.count(name) > 1:
+                raise EngineError(f"{path.name} declares two kinds named {name}")
+        _LOADED[path] = SimpleNamespace(**dict(zip(names, kinds, strict=True)))
     return _LOADED[path]
 
 

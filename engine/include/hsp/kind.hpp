@@ -84,6 +84,7 @@ template <class T>
 void collect(const char* start, const std::string& prefix, T& x, std::vector<Field>& found) {
   boost::pfr::for_each_field_with_name(x, [&](std::string_view name, auto& member) {
     using M = std::remove_cvref_t<decltype(member)>;
+    static_assert(!std::is_pointer_v<M>, "a call has no pointers; declare an In, Out or InOut");
     const std::string full = prefix + std::string(name);
     const std::int64_t offset = reinterpret_cast<const char*>(&member) - start;
     if constexpr (IsView<M>) {

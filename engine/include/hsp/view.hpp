@@ -26,6 +26,9 @@ enum class Order : std::int32_t { Rows, Columns };
 
 // Letters begin at 'A'; smaller values are the size itself.
 constexpr bool is_letter(int size) { return size >= 'A'; }
+constexpr bool is_size(int size) {
+  return (0 < size && size < 'A') || ('A' <= size && size <= 'Z') || ('a' <= size && size <= 'z');
+}
 constexpr int eigen_size(int size) { return is_letter(size) ? Eigen::Dynamic : size; }
 
 namespace detail {
@@ -40,6 +43,14 @@ struct Plain<Scalar, order, rows, columns> {
       order == Order::Rows && columns != 1 ? Eigen::RowMajor : Eigen::ColMajor;
   using type = Eigen::Matrix<Scalar, eigen_size(rows), eigen_size(columns), storage>;
 };
+
+template <class Entry, int... sizes> constexpr bool is_declared() {
+  static_assert((is_size(sizes) && ...), "a size is a number from 1 to 64, or a letter");
+  static_assert(std::is_same_v<Entry, double> || std::is_same_v<Entry, std::int64_t> ||
+                    std::is_same_v<Entry, bool>,
+                "entries are double, std::int64_t or bool");
+  return true;
+}
 
 template <Access access, class T>
 using Const = std::conditional_t<access == Access::In, const T, T>;
@@ -57,6 +68,7 @@ struct View
   static constexpr Order order = order_;
   static constexpr std::int32_t rank = sizeof...(sizes);
   static constexpr std::int32_t shape[3] = {sizes...};
+  static_assert(detail::is_declared<Entry, sizes...>());
 
   View() : Base(nullptr, least(Plain::RowsAtCompileTime), least(Plain::ColsAtCompileTime)) {}
   View(const View&) = default;
@@ -85,6 +97,7 @@ struct View<Entry, use, Order::Rows, count, rows, columns> {
   static constexpr Order order = Order::Rows;
   static constexpr std::int32_t rank = 3;
   static constexpr std::int32_t shape[3] = {count, rows, columns};
+  static_assert(detail::is_declared<Entry, count, rows, columns>());
 
   Index size() const { return size_; }
   Map operator[](Index k) const { return Map(data_ + k * rows_ * columns_, rows_, columns_); }

@@ -99,11 +99,7 @@ class Barrier(Part, ABC, family="barriers", error=LimitError):
             LimitError: If h is not one or more finite numbers, or ∇h has another shape.
         """
         state = start.state
-        needed = len(self._numbers(state)), state.robot.nv
-        if (shape := np.shape(self.gradients(state.read_only))) != needed:
-            raise LimitError(
-                f"{type(self).__name__} has gradients of shape {shape}; needs {needed}"
-            )
+        self._checked_gradients(state, len(self._numbers(state)))
         return self
 
     def rows(
@@ -116,9 +112,12 @@ class Barrier(Part, ABC, family="barriers", error=LimitError):
             bandwidth: α [1/s].
             wanted: The unconstrained acceleration, shape (nv,); it may show which rows
                 are needed.
+
+        Raises:
+            LimitError: If h or ∇h is not finite, or has another shape.
         """
         least = self._least_acceleration(state, bandwidth)
-        return self.gradients(state.read_only), least
+        return self._checked_gradients(state, len(least)), least
 
     def room(self, state: RobotState) -> int:
         """Return the maximum number of rows of `row_calls`; 0: `rows` is used."""
@@ -159,6 +158,23 @@ class Barrier(Part, ABC, family="barriers", error=LimitError):
                 "needs finite numbers, one or shape (k,)"
             )
         return found
+
+    def _checked_gradients(self, state: RobotState, count: int) -> Array:
+        """Return ∇h, shape (k, nv): a NaN would end the search for an effort."""
+        given, needed = self.gradients(state.read_only), (count, state.robot.nv)
+        try:
+            found = np.asarray(given, dtype=float)
+        except (TypeError, ValueError):
+            found = np.array(np.nan)
+        if found.shape == needed and np.isfinite(found).all():
+            return found
+        what = f"of shape {found.shape}" if found.ndim else repr(given)
+        if found.shape == needed:
+            what = "with NaN or inf"
+        raise LimitError(
+            f"{type(self).__name__} has gradients {what} at t = {state.t:.6g} s; needs "
+            f"finite numbers of shape {needed}"
+        )
 
     def _least_acceleration(self, state: RobotState, bandwidth: float) -> Array:
         """Return the least ∇h·a, shape (k,)."""

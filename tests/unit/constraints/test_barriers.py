@@ -51,6 +51,19 @@ class Given(hsp.Barrier):
         return self.function(state)
 
 
+class Later(FrameHeight):
+    """A barrier far away, whose gradients are wrong from a time on."""
+
+    wrong: Any = None
+    """What `gradients` returns then [-]."""
+
+    def values(self, state: hsp.RobotState) -> float:
+        return 10.0
+
+    def gradients(self, state: hsp.RobotState) -> Any:
+        return self.wrong if state.t > 0.01 else np.zeros((1, 7))
+
+
 class Flat(FrameHeight):
     """The Jacobian of the only row has one dimension too few."""
 
@@ -120,7 +133,7 @@ def test_a_hand_that_is_drawn_below_stays_above() -> None:
             LimitError,
             r"FrameHeight is 0\.\d+, must be at least 2",
         ),
-        (Flat(), LimitError, r"Flat has gradients of shape \(7,\); needs \(1, 7\)"),
+        (Flat(), LimitError, r"gradients of shape \(7,\) at t = 0 s; needs .*\(1, 7\)"),
         (Given(lambda _: np.nan), LimitError, "Given has the values nan at t = 0 s"),
         (Given(lambda _: []), LimitError, "needs finite numbers, one or shape"),
         (Given(lambda _: None), LimitError, "has the values None"),
@@ -135,3 +148,25 @@ def test_mistakes(barrier: Any, error: type[Exception], message: str) -> None:
         )
     if "must be at least" not in message:
         assert caught.value.path[:2] == ("barriers", 0)  # type: ignore[attr-defined]
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        (np.full((1, 7), np.nan), "gradients with NaN or inf at t = 0.02 s"),
+        (np.zeros((2, 7)), r"gradients of shape \(2, 7\) at t = 0.02 s"),
+        (None, "has gradients None at t = 0.02 s"),
+        ("none", "has gradients 'none' at t = 0.02 s"),
+    ],
+)
+def test_wrong_gradients_take_no_other_limit_away(wrong: Any, message: str) -> None:
+    """A NaN ended the search for an effort, which then kept no joint from its stop."""
+    limits = hsp.Limits(barriers=[Later(frame="panda_tcp", wrong=wrong)])
+    controller = hsp.Controller(
+        panda(), [hsp.FramePosition("panda_tcp", name="hand")], limits=limits
+    )
+    q, v = panda().home(), np.zeros(7)
+    for t in (0.0, 0.01):
+        controller.compute(t, q, v)
+    with pytest.raises(LimitError, match=message):
+        controller.compute(0.02, q, v)

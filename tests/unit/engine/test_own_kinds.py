@@ -147,6 +147,46 @@ def test_compile_errors_have_the_compiler_s_message(source: Path) -> None:
     assert "a kind needs a description: static" in reported
 
 
+DECLARATIONS = """
+#include <hsp/kind.hpp>
+
+struct Wrong {
+  static constexpr const char* doc = "Nothing that can be bound.";
+  hsp::In<200> too_long;
+  hsp::In<'1'> no_letter;
+  hsp::View<float, hsp::Access::In, hsp::Order::Rows, 'n'> single;
+  hsp::View<int, hsp::Access::Out, hsp::Order::Rows, 'n', 3, 3> narrow;
+  double* pointer;
+  void operator()() {}
+};
+
+extern "C" auto hsp_kinds_1() { return hsp::kinds<Wrong>(); }
+"""
+
+
+@pytest.mark.slow
+def test_declarations_that_cannot_be_bound_do_not_compile(source: Path) -> None:
+    """A size of 200 crashed, and an int read half of an int64."""
+    source.write_text(DECLARATIONS)
+    with pytest.raises(EngineError, match="does not compile:") as raised:
+        own_kinds.load(source)
+    reported = str(raised.value)
+    # one for each sequence of sizes, and of entries
+    assert reported.count("a size is a number from 1 to 64, or a letter") >= 2
+    assert reported.count("entries are double, std::int64_t or bool") >= 2
+    assert "a call has no pointers; declare an In, Out or InOut" in reported
+
+
+@pytest.mark.slow
+def test_two_kinds_of_one_name_are_refused(source: Path) -> None:
+    first, second = SOURCE.split('extern "C"')
+    other = first.replace("#include <hsp/kind.hpp>", "").strip()
+    both = f'{first}namespace more {{ {other} }}\nextern "C"{second}'
+    source.write_text(both.replace("<Doubled>", "<Doubled, more::Doubled>"))
+    with pytest.raises(EngineError, match=r"doubled.*declares two kinds named Doubled"):
+        own_kinds.load(source)
+
+
 @pytest.mark.slow
 def test_files_with_one_name_for_a_kind_do_not_get_each_others(source: Path) -> None:
     """Also a file that was edited in the meantime."""
