@@ -19,6 +19,7 @@ struct ChooseSets {
   OutInts<'s'> on;
   Out<'s'> shares;
   static constexpr Index most = 64;
+  static constexpr double least = 1e-12;  // what is shorter is rounding; as in mixture.py
 
   void check() const {
     if (highs.size() > most) throw std::invalid_argument("there may be 64 parts");
@@ -36,7 +37,7 @@ struct ChooseSets {
     shares.setZero();
     for (Index i = 0; i + 1 < count; ++i) {
       const double high = ends[i], low = ends[i + 1];
-      if (high == low) continue;
+      if (high - low < least) continue;
       const Index s = place_of(active(low, high));
       if (s == on.size()) {
         on.setZero();

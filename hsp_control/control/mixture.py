@@ -344,7 +344,8 @@ class Mixture:
 
 
 _ROUNDING = 1e-12
-"""What is shorter is no share: times of two schedules that meet differ by rounding."""
+"""What is shorter is no share: times of two schedules that meet differ by rounding. As
+in the engine's `ChooseSets`."""
 
 
 def _mean(shares: Sequence[float], parts: Sequence[Array]) -> Array:

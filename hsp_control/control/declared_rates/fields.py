@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hsp_control.common.arrays import Array
+from hsp_control.common.errors import MetricError
 from hsp_control.control.declared_rates.comparison import (
     Declared,
     ValueAndRate,
@@ -75,13 +76,24 @@ def check_field(field: NullSpaceField, state: RobotState) -> None:
 
 
 def check_metric(metric: Metric, state: RobotState) -> None:
-    """Check the rates of a placed metric at a state; see `check_field`."""
-    if is_own(type(metric)) or metric.form != VARYING:
+    """Check a placed metric and its rates at a state; see `check_field`.
+
+    Raises:
+        MetricError: If W is not L Lᵀ with a lower triangle L.
+    """
+    if is_own(type(metric)):
+        return
+
+    def sample(state: RobotState) -> MetricSample:
+        given = as_given(metric, state)
+        return metric.evaluate(given, MetricSample.allocate(state.robot.nv))
+
+    _check_factor(metric, sample(state))
+    if metric.form != VARYING:
         return
 
     def at(state: RobotState) -> tuple[Array, Array]:
-        given = as_given(metric, state)
-        out = metric.evaluate(given, MetricSample.allocate(state.robot.nv))
+        out = sample(state)
         return out.W.ravel(), out.W_dot.ravel()
 
     def entry(i: int) -> str:
@@ -90,6 +102,27 @@ def check_metric(metric: Metric, state: RobotState) -> None:
     by = declared_by(metric, ("call", "evaluate"))
     part = f"metric {type(metric).__name__}"
     _OfField(Declared(part, by, "W", "W' = ∂W/∂q·v", entry), at).check(state)
+
+
+def _check_factor(metric: Metric, found: object) -> None:
+    """Check W = L Lᵀ up to rounding: so W is symmetric and positive definite."""
+    name = type(metric).__name__
+    if not isinstance(found, MetricSample):
+        raise MetricError(f"{name}.evaluate returns {found!r}; needs out, its sample")
+    W, L = found.W, found.L
+    finite = np.isfinite(W).all() and np.isfinite(L).all()
+    scale = _ROUNDING * np.abs(W).max()
+    if not (finite and np.diag(L).min() > 0.0 and np.abs(L @ L.T - W).max() <= scale):
+        raise MetricError(
+            f"{name}: W is not L Lᵀ; needs a symmetric positive definite W, with its "
+            "Cholesky factor L, for example out.L[:] = np.linalg.cholesky(out.W)"
+        )
+    if np.abs(np.triu(L, 1)).max() > 0.0:
+        raise MetricError(f"{name}: L is not a lower triangle")
+
+
+_ROUNDING = 1e-9
+"""Of W's largest entry: a factorisation has 1e-15, a mistake of a user's much more."""
 
 
 def _of_field(field: NullSpaceField, robot: Robot) -> Iterator[_OfField]:

@@ -7,10 +7,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from numpy.linalg import cholesky
 
 import hsp_control as hsp
 from hsp_control.common.arrays import Array
-from hsp_control.common.errors import RateError
+from hsp_control.common.errors import MetricError, RateError
 from hsp_control.declaration import imported
 from hsp_control.declaration.language import in_yaml
 from hsp_control.engine.plans import PartCall
@@ -280,6 +281,49 @@ def test_a_wrong_metric_is_named() -> None:
     words = r"metric: .* Lengthened.evaluate is wrong: W' = .* \(\d, \d\)"
     with pytest.raises(RateError, match=words):
         first_step(hsp.JointCentering(), metric=Lengthened(-1.0))
+
+
+class Given(hsp.metrics.Metric):
+    """W and L as given, at all times."""
+
+    form = VARYING
+    make: Callable[[Any], Any]
+
+    def evaluate(self, state: hsp.RobotState, out: Any) -> Any:
+        return self.make(out)
+
+
+def filled(W: Array, L: Array) -> Callable[[Any], Any]:
+    """Return a function that writes both."""
+
+    def fill(out: Any) -> Any:
+        out.W[:], out.L[:] = W, L
+        return out
+
+    return fill
+
+
+ONE, TILTED = np.eye(7), np.eye(7) + 0.1 * np.eye(7, k=1)
+PRODUCT = TILTED @ TILTED.T
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (filled(-ONE, ONE), "Given: W is not L Lᵀ; needs a symmetric positive"),
+        (filled(TILTED, ONE), "W is not L Lᵀ"),
+        (filled(ONE, 2.0 * ONE), "W is not L Lᵀ"),
+        (filled(ONE, -ONE), "W is not L Lᵀ"),
+        (filled(np.nan * ONE, ONE), "W is not L Lᵀ"),
+        (filled(PRODUCT, TILTED), "Given: L is not a lower triangle"),
+        (lambda _: None, "Given.evaluate returns None; needs out, its sample"),
+    ],
+)
+def test_a_metric_that_is_none_is_refused(make: Any, message: str) -> None:
+    """The law would be another one, without a word."""
+    first_step(hsp.JointCentering(), metric=Given(filled(PRODUCT, cholesky(PRODUCT))))
+    with pytest.raises(MetricError, match=message):
+        first_step(hsp.JointCentering(), metric=Given(make))
 
 
 class Damping(VectorField):
