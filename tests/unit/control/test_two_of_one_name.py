@@ -84,7 +84,7 @@ def test_one_that_comes_later_goes_on_with_the_columns() -> None:
     )
     assert "task.hand_2.error" not in log.columns
     gone = np.isnan(log["task.hand.error"]).all(axis=1)
-    np.testing.assert_array_equal(gone, (log.t > 0.151) & (log.t <= 0.2))
+    np.testing.assert_array_equal(gone, (log.t > 0.149) & (log.t <= 0.2))
 
 
 def test_impedances_of_one_name_wait_by_themselves() -> None:
