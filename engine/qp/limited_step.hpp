@@ -6,8 +6,8 @@
 //   base        (M a + N - F f)_base = 0                          no motor acts there
 //   effort      bounds on M a + N - F f, within the rate limit of the last effort
 //
-// and then those of cones (Python's), barriers (`PlaceRows`) and contacts (`RelaxedRows`). The bounds of x are those
-// on a from position, velocity and acceleration limits, and those of f.
+// and then those of cones (Python's), barriers (`PlaceRows`) and contacts (`RelaxedRows`). The
+// bounds of x are those on a from position, velocity and acceleration limits, and those of f.
 #pragma once
 #include <cmath>
 

@@ -235,7 +235,8 @@ class LogWriter:
         row["null_space_norm"][...] = diagnostics.null_space_norm
         row["manipulability"][...] = diagnostics.manipulability
         row["singular_values"][: len(values)] = values
-        row["damped"][...] = stacks[-1].damped_level if output.damped else 0
+        levels = [each.damped_level for each in stacks] if output.damped else []
+        row["damped"][...] = next(filter(None, levels), 0)
         row["status"][...] = output.status
         row["relaxation"][...] = output.relaxation
         self._contacts.write(state.t, output)
