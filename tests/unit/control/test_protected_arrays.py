@@ -515,6 +515,20 @@ def test_the_output_of_another_kind_is_named(metric: Metric) -> None:
 # -- a fork beside a thread ------------------------------------------------------------
 
 
+def holds_in_a_fork(look: Callable[[], bool]) -> bool:
+    """Return what a forked process finds; False also if it waits for ever."""
+    child = os.fork()
+    if child == 0:  # without pytest's own handlers
+        signal.signal(signal.SIGALRM, signal.SIG_DFL)
+        signal.alarm(60)
+        code = 1
+        try:
+            code = 0 if look() else 2
+        finally:
+            os._exit(code)
+    return os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 0
+
+
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="no processes that fork")
 @pytest.mark.filterwarnings("ignore:.*multi-threaded.*:DeprecationWarning")
 def test_a_fork_while_a_thread_computes_is_one_error() -> None:
@@ -540,22 +554,19 @@ def test_a_fork_while_a_thread_computes_is_one_error() -> None:
     thread = threading.Thread(target=own.compute, args=(0.0, q, v))
     thread.start()
     assert inside.wait(60.0)
-    child = os.fork()
-    if child == 0:  # without pytest's own handlers
-        signal.signal(signal.SIGALRM, signal.SIG_DFL)
-        signal.alarm(60)  # ends the child if it deadlocks
-        code = 1
+
+    def look() -> bool:
+        other.compute(0.0, q, v)  # no step was under way
         try:
-            other.compute(0.0, q, v)  # no step was under way
-            try:
-                own.compute(0.0, q, v)
-            except ControllerError as error:
-                code = 0 if "was forked while another thread" in str(error) else 2
-        finally:
-            os._exit(code)
+            own.compute(0.0, q, v)
+        except ControllerError as error:
+            return "was forked while another thread" in str(error)
+        return False
+
+    held = holds_in_a_fork(look)
     leave.set()
     thread.join()
-    assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 0
+    assert held
     own.compute(0.0, q, v)  # the parent is unaffected
 
 
@@ -588,22 +599,13 @@ class Slow:
 @pytest.mark.filterwarnings("ignore:.*multi-threaded.*:DeprecationWarning")
 def test_a_fork_while_a_thread_caches_a_property_leaves_no_lock() -> None:
     """Python 3.11 has one lock for all objects of a class: a child waited for ever."""
-    assert StepLock  # whose module renews them
     thread = threading.Thread(target=lambda: Slow(quick=False).number)
     thread.start()
     assert Slow.inside.wait(60.0)
-    child = os.fork()
-    if child == 0:  # without pytest's own handlers
-        signal.signal(signal.SIGALRM, signal.SIG_DFL)
-        signal.alarm(60)  # ends the child if it deadlocks
-        code = 1
-        try:
-            code = 0 if Slow(quick=True).number == 3 else 2
-        finally:
-            os._exit(code)
+    held = holds_in_a_fork(lambda: Slow(quick=True).number == 3)
     Slow.leave.set()
     thread.join()
-    assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 0
+    assert held
 
 
 def test_a_lock_that_is_held_around_a_step_is_free_in_a_forked_process() -> None:
